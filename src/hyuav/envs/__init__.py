@@ -1,0 +1,1 @@
+"""The system as TorchRL and Gymnasium environments."""

@@ -1,0 +1,68 @@
+"""What the environments accept as arguments, and how they answer anything else."""
+
+from collections.abc import Sequence
+
+import torch
+
+from hyuav.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav.scenario import Scenario
+from hyuav.system import SCHEMES
+
+
+def as_scenario(scenario: Scenario | str) -> Scenario:
+    """A scenario as it is, or the preset of that name."""
+    if isinstance(scenario, str):
+        return Scenario.preset(scenario)
+    if not isinstance(scenario, Scenario):
+        raise InputTypeError(rejection("scenario", scenario, "a Scenario or a preset's name"))
+    return scenario
+
+
+def as_batch_size(batch_size: int | Sequence[int]) -> torch.Size:
+    """A whole number or a sequence of them, each at least 1."""
+    sizes = (batch_size,) if isinstance(batch_size, int) else batch_size
+    accepted = "whole numbers >= 1"
+    if not isinstance(sizes, Sequence) or not all(type(size) is int for size in sizes):
+        raise InputTypeError(rejection("batch_size", batch_size, accepted))
+    if any(size < 1 for size in sizes):
+        raise InputError(rejection("batch_size", batch_size, accepted))
+    return torch.Size(sizes)
+
+
+def as_schemes(scheme: str | Sequence[str], batch_size: torch.Size) -> tuple[str, ...]:
+    """One scheme for all rows, or one for each row of the batch's first dimension."""
+    if isinstance(scheme, str):
+        require_choice("scheme", scheme, SCHEMES)
+        return (scheme,)
+    if not isinstance(scheme, Sequence):
+        raise InputTypeError(rejection("scheme", scheme, f"one of {', '.join(SCHEMES)}"))
+    for index, name in enumerate(scheme):
+        require_choice(f"scheme[{index}]", name, SCHEMES)
+    if not batch_size or len(scheme) != batch_size[0]:
+        rows = batch_size[0] if batch_size else 0
+        raise InputError(rejection("scheme", scheme, f"one name, or one for each of {rows} rows"))
+    return tuple(scheme)
+
+
+def as_device(device: torch.device | str | None) -> torch.device:
+    """A device that PyTorch can place tensors on here; the CPU where none is named."""
+    try:
+        resolved = torch.device("cpu" if device is None else device)
+        torch.empty(0, device=resolved)
+    except (RuntimeError, AssertionError, TypeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        accepted = f"a device of this machine, such as cpu or cuda ({reason})"
+        raise InputError(rejection("device", device, accepted)) from None
+    return resolved
+
+
+def as_seed(seed: int | None) -> int:
+    """A seed as it is, or one drawn from PyTorch's global generator where none is given."""
+    if seed is None:
+        return int(torch.randint(2**62, ()))
+    accepted = "a whole number in [0, 2^63)"
+    if isinstance(seed, bool) or not hasattr(seed, "__index__"):
+        raise InputTypeError(rejection("seed", seed, accepted))
+    if not 0 <= (number := seed.__index__()) < 2**63:
+        raise InputError(rejection("seed", seed, accepted))
+    return number

@@ -1,0 +1,209 @@
+"""The helper's flight as a natively batched TorchRL environment."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+from hyuav.envs.arguments import as_batch_size, as_device, as_scenario, as_schemes, as_seed
+from hyuav.envs.diagnostics import Slot, diagnose, diagnostics_spec
+from hyuav.errors import InputError, rejection
+from hyuav.model.offloading import prefers_relay
+from hyuav.scenario import Scenario
+from hyuav.system import SecureOffloadingSystem
+
+
+class SecureOffloadingEnv(EnvBase):
+    """A helper UAV flies, and in each slot relays or jams so that the secrecy sum-rate is largest.
+
+    Time is not limited here (:func:`hyuav.make_env` truncates after T slots) and no state is
+    terminal. All entries are physical and have the batch size in front; U is the number of UEs.
+
+    Observation:
+        - ``position`` (2,) float32, m: the helper's, within the map.
+        - ``mode`` (1,) int64: 1 relay, 0 jamming; after a reset, the mode at the start position.
+        - ``distances`` (U + 2,) float32, m: horizontal, to the UEs in order, then L, then E.
+        - ``off_map`` (1,) bool: the last flight would have left the map and was turned back.
+        - ``diagnostics``, only where asked for, see :mod:`hyuav.envs.diagnostics`.
+
+    Action:
+        - ``action`` (2,) float32 in [-1, 1]: the velocity in units of v_max. It is clipped, then
+          shortened to the speed limit and to the helper's energy budget.
+
+    Reward:
+        - ``reward`` (1,) float32, bps/Hz: the secrecy sum-rate of the slot (eq. 6), before any
+          penalty.
+
+    Termination: never.
+
+    A reset that is given ``position`` (2,) starts there, otherwise at ``helper_start``.
+
+    Args:
+        scenario: node positions and parameters, or the name of a preset.
+        scheme: "hybrid", "relay" or "jamming"; or one of these for each row of the batch's
+            first dimension.
+        batch_size: of the helpers flown at once.
+        device: of all tensors.
+        seed: of the fading and the tasks; the same seed gives the same episode, whether or not
+            diagnostics are asked for.
+        diagnostics: compute the ``diagnostics`` entry too.
+
+    Raises:
+        InputError: (a ``ValueError``) an unknown preset, scheme or device, a negative seed.
+        InputTypeError: (also a ``TypeError``) an argument of the wrong type.
+
+    Example:
+        >>> env = SecureOffloadingEnv(Scenario.preset("two_clusters"), batch_size=(4,), seed=0)
+        >>> env.rollout(5)["next", "reward"].shape
+        torch.Size([4, 5, 1])
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | str,
+        scheme: str | Sequence[str] = "hybrid",
+        batch_size: int | Sequence[int] = (),
+        device: torch.device | str | None = None,
+        seed: int | None = None,
+        diagnostics: bool = False,
+    ) -> None:
+        super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
+        self.system = SecureOffloadingSystem(as_scenario(scenario), self.device)
+        self.schemes = as_schemes(scheme, self.batch_size)
+        self.diagnostics = diagnostics
+        self._always_relay = self._rows_that_fly("relay")
+        self._always_jam = self._rows_that_fly("jamming")
+        norm_limit = self.system.norm_limit(self.schemes)
+        self._norm_limit = None if norm_limit is None else self._per_row(norm_limit)
+        self._make_specs()
+        self._fading_rng = torch.Generator(self.system.device)
+        self._task_rng = torch.Generator(self.system.device)
+        self.set_seed(as_seed(seed))
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario that is flown."""
+        return self.system.scenario
+
+    def _per_row(self, values: Tensor) -> Tensor:
+        """Rows of values (1, k) or (rows, k), shaped to broadcast against (*batch_size, k)."""
+        if values.shape[0] == 1:
+            return values[0]
+        inner = len(self.batch_size) - 1
+        return values.reshape(-1, *(1,) * inner, values.shape[-1])
+
+    def _rows_that_fly(self, scheme: str) -> Tensor:
+        flags = [[name == scheme] for name in self.schemes]
+        return self._per_row(torch.tensor(flags, device=self.device))
+
+    def _make_specs(self) -> None:
+        batch, half = self.batch_size, self.scenario.map_side / 2
+        self.observation_spec = Composite(
+            position=Bounded(-half, half, (*batch, 2), dtype=torch.float32),
+            mode=Categorical(2, (*batch, 1), dtype=torch.int64),
+            distances=Unbounded((*batch, self.scenario.num_ues + 2), dtype=torch.float32),
+            off_map=Binary(1, (*batch, 1), dtype=torch.bool),
+            shape=batch,
+            device=self.device,
+        )
+        if self.diagnostics:
+            self.observation_spec["diagnostics"] = diagnostics_spec(
+                batch, self.scenario.num_ues, self.device
+            )
+        # What a step reads besides the action; a reset may be given it too.
+        self.state_spec = Composite(
+            position=self.observation_spec["position"].clone(), shape=batch, device=self.device
+        )
+        if self.diagnostics:
+            edge_load = self.observation_spec["diagnostics", "edge_load"].clone()
+            self.state_spec["diagnostics"] = Composite(edge_load=edge_load, shape=batch)
+        self.action_spec = Bounded(-1.0, 1.0, (*batch, 2), dtype=torch.float32, device=self.device)
+        self.reward_spec = Unbounded((*batch, 1), dtype=torch.float32, device=self.device)
+        self.done_spec = Composite(
+            done=Binary(1, (*batch, 1), dtype=torch.bool),
+            terminated=Binary(1, (*batch, 1), dtype=torch.bool),
+            shape=batch,
+            device=self.device,
+        )
+
+    def _set_seed(self, seed: int | None) -> None:
+        root = torch.Generator().manual_seed(as_seed(seed))
+        fading_seed, task_seed = torch.randint(2**62, (2,), generator=root).tolist()
+        self._fading_rng.manual_seed(fading_seed)
+        self._task_rng.manual_seed(task_seed)
+
+    def random_state(self) -> dict[str, Tensor]:
+        """The state of the random numbers, as :meth:`set_random_state` takes it."""
+        return {"fading": self._fading_rng.get_state(), "tasks": self._task_rng.get_state()}
+
+    def set_random_state(self, state: dict[str, Tensor]) -> None:
+        """Continue the random numbers where :meth:`random_state` was taken."""
+        self._fading_rng.set_state(state["fading"])
+        self._task_rng.set_state(state["tasks"])
+
+    def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
+        position = None if tensordict is None else tensordict.get("position", None)
+        if position is None:
+            position = self.system.helper_start.expand(*self.batch_size, 2).clone()
+        else:
+            position = self._checked_position(position)
+        slot = self._slot(position)
+        after_reset = self._observation(slot, torch.zeros_like(slot.relay_mode))
+        if self.diagnostics:
+            after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
+        return after_reset
+
+    def _checked_position(self, position: Tensor) -> Tensor:
+        expected, half = (*self.batch_size, 2), self.scenario.map_side / 2
+        if position.shape != expected:
+            raise InputError(rejection("position", tuple(position.shape), f"shape {expected}"))
+        position = position.to(self.device, torch.float32, copy=True)
+        outside = ~(position.abs() <= half).all(dim=-1)
+        if bool(outside.any()):
+            accepted = f"a position on the map, x and y in [{-half:g}, {half:g}] m"
+            raise InputError(rejection("position", position[outside][0].tolist(), accepted))
+        return position
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        flown = self.system.move(tensordict["position"], tensordict["action"], self._norm_limit)
+        slot = self._slot(flown.position)
+        after = self._observation(slot, flown.off_map.unsqueeze(-1))
+        after["reward"] = torch.where(
+            slot.relay_mode,
+            slot.relay.sum_rate.unsqueeze(-1),
+            slot.jamming.sum_rate.unsqueeze(-1),
+        )
+        after["done"] = torch.zeros_like(slot.relay_mode)
+        after["terminated"] = torch.zeros_like(slot.relay_mode)
+        if self.diagnostics:
+            edge_load = tensordict["diagnostics", "edge_load"]
+            after["diagnostics"] = diagnose(self.system, flown, slot, edge_load)
+        return after
+
+    def _slot(self, position: Tensor) -> Slot:
+        """Lines 6 to 11 of Algorithm 1 with the helper at ``position`` (*batch_size, 2) m."""
+        fading = self.system.draw_fading(self.batch_size, self._fading_rng)
+        tasks = None
+        if self.diagnostics or self.system.edge_can_saturate:
+            tasks = self.system.draw_tasks(self.batch_size, self._task_rng)
+        distances = self.system.distances(position)
+        gains = self.system.channel_gains(distances, fading)
+        relay = self.system.relay_outcome(distances, gains, tasks)
+        jamming = self.system.jamming_outcome(gains, tasks)
+        relay_mode = prefers_relay(relay.sum_rate, jamming.sum_rate).unsqueeze(-1)
+        relay_mode = (relay_mode | self._always_relay) & ~self._always_jam
+        return Slot(position, distances, relay_mode, relay, jamming, tasks)
+
+    def _observation(self, slot: Slot, off_map: Tensor) -> TensorDictBase:
+        return TensorDict(
+            position=slot.position,
+            mode=slot.relay_mode.to(torch.int64),
+            distances=slot.distances,
+            off_map=off_map,
+            batch_size=self.batch_size,
+            device=self.device,
+        )

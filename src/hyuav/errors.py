@@ -1,0 +1,34 @@
+"""The errors a user can cause, each told in one line."""
+
+import difflib
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """A value that is not accepted; the message names the field, the value and what is accepted."""
+
+
+class InputTypeError(InputError, TypeError):
+    """A value of a type that is not accepted."""
+
+
+def rejection(name: str, value: object, accepted: str) -> str:
+    """The one line that answers bad input: field, value (shortened), what is accepted."""
+    shown = " ".join(repr(value).split())
+    if len(shown) > 80:
+        shown = f"{shown[:77]}..."
+    return f"{name} = {shown}: expected {accepted}"
+
+
+def require_choice(name: str, value: object, choices: Iterable[str]) -> None:
+    """Accept ``value`` only where it is one of ``choices``.
+
+    Raises:
+        InputError: naming the choices, the most similar one first if there is one.
+    """
+    choices = list(choices)
+    if value in choices:
+        return
+    similar = difflib.get_close_matches(str(value), choices, n=1)
+    hint = f" (did you mean {similar[0]!r}?)" if similar else ""
+    raise InputError(rejection(name, value, f"one of {', '.join(choices)}") + hint)

@@ -1,0 +1,72 @@
+"""Distances and channel power gains: the paper's equations 3 and 4.
+
+All functions take tensors with any leading batch shape (written ``...``), in float32 or float64.
+"""
+
+import torch
+from torch import Tensor
+
+REFERENCE_DISTANCE = 1.0
+"""d_0 in metres: the distance at which the reference gains beta_0 and beta_1 are received."""
+
+
+def horizontal_distance(position: Tensor, other: Tensor) -> Tensor:
+    """Euclidean distance on the ground plane, D (m).
+
+    Args:
+        position: (..., 2) m.
+        other: (..., 2) m, broadcast against ``position``.
+
+    Returns:
+        (...) m.
+    """
+    distance: Tensor = torch.linalg.vector_norm(position - other, dim=-1)
+    return distance
+
+
+def path_gain(distance: Tensor, height_difference: float, reference_gain: float) -> Tensor:
+    """Path power gain beta / (h^2 + D^2): the first factor of eq. 3 and of eq. 4.
+
+    The squared distance is clamped below by d_0^2, so that the gain stays finite where the
+    helper flies straight above another UAV at its own altitude.
+
+    Args:
+        distance: (...) horizontal distance in m.
+        height_difference: in m.
+        reference_gain: beta_0 or beta_1, the gain at d_0.
+
+    Returns:
+        (...) dimensionless.
+    """
+    squared = distance.square() + height_difference**2
+    return squared.clamp(min=REFERENCE_DISTANCE**2).reciprocal() * reference_gain
+
+
+def k_factor_from_db(k_factor_db: float) -> float:
+    """The Rician K-factor as a power ratio."""
+    return float(10.0 ** (k_factor_db / 10.0))
+
+
+def rician_power(
+    k_factor: Tensor, shape: tuple[int, ...], generator: torch.Generator | None = None
+) -> Tensor:
+    r"""Draw small-scale fading as a power, \|gamma\|^2 with unit mean (text below eq. 3).
+
+    gamma = sqrt(K / (K + 1)) + sqrt(1 / (K + 1)) n with n circularly symmetric complex
+    Gaussian of unit variance. An equation multiplies a power gain by gamma, so it is the
+    squared magnitude that enters.
+
+    Args:
+        k_factor: K as a power ratio, broadcast against ``shape``; fixes dtype and device.
+        shape: of the result; each element is an independent draw.
+        generator: of the random numbers, on the device of ``k_factor``.
+
+    Returns:
+        ``shape``, dimensionless.
+    """
+    line_of_sight = (k_factor / (k_factor + 1.0)).sqrt()
+    scatter = (0.5 / (k_factor + 1.0)).sqrt()
+    normal = torch.randn(
+        (2, *shape), generator=generator, dtype=k_factor.dtype, device=k_factor.device
+    )
+    return (line_of_sight + scatter * normal[0]).square() + (scatter * normal[1]).square()

@@ -1,0 +1,55 @@
+"""Energies of computing, transmitting and flying: the paper's equation 7 and section II-C."""
+
+from torch import Tensor
+
+
+def computation_energy(frequency: Tensor, capacitance: float, slot_duration: float) -> Tensor:
+    """Eq. 7: kappa f^3 Delta in J, for a CPU that runs at ``frequency`` (cycle/s) through a slot.
+
+    The capacitance is drawn into the cube so that float32 does not overflow with many UEs.
+    """
+    return (capacitance ** (1.0 / 3.0) * frequency).pow(3) * slot_duration
+
+
+def offloading_energy(ue_power: float, slot_duration: float, num_ues: int, *, relay: bool) -> float:
+    """First term of eq. 8e: p_u Delta / U in J, half of it in relay mode (two time fractions)."""
+    return ue_power * slot_duration / ((2 if relay else 1) * num_ues)
+
+
+def relay_energy(offloading: Tensor, relay_power: float, slot_duration: float) -> Tensor:
+    """Transmission energy in relay mode, sum_u z_u p_R Delta / (2 U) in J.
+
+    Args:
+        offloading: (..., U) bool, z_u.
+        relay_power: p_R in W.
+        slot_duration: Delta in s.
+
+    Returns:
+        (...) J.
+    """
+    num_ues = offloading.shape[-1]
+    return offloading.sum(dim=-1) * (relay_power * slot_duration / (2 * num_ues))
+
+
+def jamming_energy(jamming_power: float, slot_duration: float) -> float:
+    """Transmission energy in jamming mode, p_J Delta in J: the helper jams through the slot."""
+    return jamming_power * slot_duration
+
+
+def flight_energy(velocity: Tensor, helper_mass: float, slot_duration: float) -> Tensor:
+    """0.5 M Delta |v|^2 in J.
+
+    Args:
+        velocity: (..., 2) m/s.
+        helper_mass: M in kg.
+        slot_duration: Delta in s.
+
+    Returns:
+        (...) J.
+    """
+    return 0.5 * helper_mass * slot_duration * velocity.square().sum(dim=-1)
+
+
+def speed_within_budget(energy: float, helper_mass: float, slot_duration: float) -> float:
+    """The speed in m/s at which flying through a slot takes ``energy`` J; 0 below 0 J."""
+    return float((max(energy, 0.0) / (0.5 * helper_mass * slot_duration)) ** 0.5)

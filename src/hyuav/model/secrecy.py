@@ -1,0 +1,95 @@
+"""Achievable rates of the two modes (the paper's rate table) and the secrecy sum-rate (eq. 6)."""
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+
+class ChannelGains(NamedTuple):
+    """Channel power gains of one slot; U is the number of UEs."""
+
+    ue_to_legitimate: Tensor
+    """g_{u,L}: (..., U)."""
+    ue_to_helper: Tensor
+    """g_{u,H}: (..., U)."""
+    ue_to_eavesdropper: Tensor
+    """g_{u,E}: (..., U)."""
+    helper_to_legitimate: Tensor
+    """g_{H,L}: (..., 1)."""
+    helper_to_eavesdropper: Tensor
+    """g_{H,E}: (..., 1)."""
+
+
+class AchievableRates(NamedTuple):
+    """What the legitimate and the eavesdropper UAV can receive, in bps/Hz."""
+
+    legitimate: Tensor
+    """R^d_u: (..., U)."""
+    eavesdropper: Tensor
+    """R^e_u: (..., U)."""
+
+
+def spectral_efficiency(snr: Tensor) -> Tensor:
+    """log2(1 + SNR) in bps/Hz, accurate for small SNR too."""
+    return torch.log1p(snr) / math.log(2.0)
+
+
+def relay_rates(
+    gains: ChannelGains, ue_power: float, relay_power: float, noise_power: float
+) -> AchievableRates:
+    """Rates in relay mode: decode-and-forward in two halves of the UE's share of the slot.
+
+    Args:
+        gains: of the slot.
+        ue_power: p_u in W.
+        relay_power: p_R in W.
+        noise_power: sigma^2 in W.
+    """
+    ue_snr, relay_snr = ue_power / noise_power, relay_power / noise_power
+    combined = relay_snr * gains.helper_to_legitimate + ue_snr * gains.ue_to_legitimate
+    decoded = ue_snr * gains.ue_to_helper
+    overheard = relay_snr * gains.helper_to_eavesdropper + ue_snr * gains.ue_to_eavesdropper
+    return AchievableRates(
+        legitimate=0.5 * spectral_efficiency(torch.minimum(combined, decoded)),
+        eavesdropper=0.5 * spectral_efficiency(overheard),
+    )
+
+
+def jamming_rates(
+    gains: ChannelGains, ue_power: float, jamming_power: float, noise_power: float
+) -> AchievableRates:
+    """Rates in jamming mode: the helper's noise reaches the eavesdropper and the legitimate UAV.
+
+    Args:
+        gains: of the slot.
+        ue_power: p_u in W.
+        jamming_power: p_J in W.
+        noise_power: sigma^2 in W.
+    """
+    ue_snr, jamming_snr = ue_power / noise_power, jamming_power / noise_power
+    at_legitimate = ue_snr / (jamming_snr * gains.helper_to_legitimate + 1.0)
+    at_eavesdropper = ue_snr / (jamming_snr * gains.helper_to_eavesdropper + 1.0)
+    return AchievableRates(
+        legitimate=spectral_efficiency(at_legitimate * gains.ue_to_legitimate),
+        eavesdropper=spectral_efficiency(at_eavesdropper * gains.ue_to_eavesdropper),
+    )
+
+
+def secrecy_rate(rates: AchievableRates) -> Tensor:
+    """[R^d_u - R^e_u]^+ of eq. 6: (..., U) bps/Hz."""
+    return (rates.legitimate - rates.eavesdropper).clamp(min=0.0)
+
+
+def secrecy_sum_rate(secrecy_rate: Tensor, offloading: Tensor) -> Tensor:
+    """C of eq. 6: the secrecy rates summed over the UEs that offload.
+
+    Args:
+        secrecy_rate: (..., U) bps/Hz.
+        offloading: (..., U) bool, z_u.
+
+    Returns:
+        (...) bps/Hz.
+    """
+    return (secrecy_rate * offloading).sum(dim=-1)
