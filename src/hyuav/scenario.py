@@ -1,23 +1,22 @@
 """What is fixed in an experiment: the node positions and the paper's parameter table."""
 
-import dataclasses
-import difflib
-import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
-from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
-from yaml import YAMLError
-
-from hyuav.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav.errors import InputError, rejection, require_choice
+from hyuav.parameters import (
+    Parameters,
+    choice,
+    count,
+    increasing_pair,
+    number,
+    parameter,
+    sequence,
+    switch,
+)
 
 Point = tuple[float, float]
 """Horizontal coordinates (x, y) in metres."""
-
-SPEED_LIMITS = ("box", "disc")
 
 PRESETS: dict[str, tuple[Point, ...]] = {
     "random_disk": (
@@ -31,95 +30,14 @@ PRESETS: dict[str, tuple[Point, ...]] = {
 }
 """UE positions in metres of the two layouts that reproduce the paper's figures 3a and 3b."""
 
-Converter = Callable[[str, Any], Any]
-
-
-def _number(low: float = -math.inf, *, strict: bool = False) -> Converter:
-    """Accept finite numbers that are at least ``low`` (above it where ``strict``)."""
-    bound = "" if low == -math.inf else f" {'>' if strict else '>='} {low:g}"
-
-    def convert(name: str, value: Any) -> float:
-        accepted = f"a finite number{bound}"
-        if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
-            raise InputTypeError(rejection(name, value, accepted))
-        try:
-            number = float(value)
-        except (TypeError, ValueError, RuntimeError, OverflowError):
-            raise InputTypeError(rejection(name, value, accepted)) from None
-        if not math.isfinite(number) or number < low or (strict and number == low):
-            raise InputError(rejection(name, value, accepted))
-        return number
-
-    return convert
-
-
-def _count(name: str, value: Any) -> int:
-    """Accept whole numbers that are at least one."""
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise InputTypeError(rejection(name, value, "a whole number >= 1"))
-    if (count := value.__index__()) < 1:
-        raise InputError(rejection(name, value, "a whole number >= 1"))
-    return int(count)
-
-
-def _switch(name: str, value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise InputTypeError(rejection(name, value, "true or false"))
-    return value
-
-
-def _speed_limit(name: str, value: Any) -> str:
-    require_choice(name, value, SPEED_LIMITS)
-    return str(value)
-
-
-def _sequence(name: str, value: Any, accepted: str) -> list[Any]:
-    if hasattr(value, "tolist"):  # a tensor or an array
-        value = value.tolist()
-    if not isinstance(value, list | tuple):
-        raise InputTypeError(rejection(name, value, accepted))
-    return list(value)
-
-
-def _pair(name: str, value: Any, accepted: str, element: Converter) -> tuple[float, float]:
-    items = _sequence(name, value, accepted)
-    if len(items) != 2:
-        raise InputError(rejection(name, value, accepted))
-    return element(f"{name}[0]", items[0]), element(f"{name}[1]", items[1])
-
-
-def _point(name: str, value: Any) -> Point:
-    return _pair(name, value, "two coordinates (x, y) in metres", _number())
-
-
-def _points(name: str, value: Any) -> tuple[Point, ...]:
-    accepted = "at least one pair of coordinates (x, y) in metres"
-    items = _sequence(name, value, accepted)
-    if not items:
-        raise InputError(rejection(name, value, accepted))
-    return tuple(_point(f"{name}[{index}]", item) for index, item in enumerate(items))
-
-
-def _range(name: str, value: Any) -> tuple[float, float]:
-    accepted = "two numbers (low, high) with 0 <= low <= high"
-    low, high = _pair(name, value, accepted, _number(0.0))
-    if low > high:
-        raise InputError(rejection(name, value, accepted))
-    return low, high
-
-
-def _parameter(default: Any, symbol: str, unit: str, convert: Converter) -> Any:
-    metadata = {"symbol": symbol, "unit": unit, "convert": convert}
-    if default is dataclasses.MISSING:
-        return dataclasses.field(metadata=metadata)
-    return dataclasses.field(default=default, metadata=metadata)
-
-
-_non_negative, _positive = _number(0.0), _number(0.0, strict=True)
+_non_negative, _positive, _range = number(0.0), number(above=0.0), increasing_pair(0.0)
+_decibel = number(-100.0, 100.0)
+_point = sequence(number(), "two coordinates (x, y) in metres", length=2)
+_points = sequence(_point, "at least one pair of coordinates (x, y) in metres")
 
 
 @dataclass(frozen=True)
-class Scenario:
+class Scenario(Parameters):
     """One experiment's node positions and parameters, checked on creation and immutable.
 
     Change a scenario with :func:`dataclasses.replace`. Each field's ``metadata`` holds the
@@ -136,42 +54,41 @@ class Scenario:
         10
     """
 
-    ue_positions: tuple[Point, ...] = _parameter(dataclasses.MISSING, "(x_u, y_u)", "m", _points)
-    legitimate_position: Point = _parameter((0.0, 0.0), "(x_L, y_L)", "m", _point)
-    eavesdropper_position: Point = _parameter((80.0, 80.0), "(x_E, y_E)", "m", _point)
-    helper_start: Point = _parameter((-60.0, -60.0), "(x_H(0), y_H(0))", "m", _point)
-    num_slots: int = _parameter(20, "T", "", _count)
-    slot_duration: float = _parameter(1.0, "Delta", "s", _positive)
-    map_side: float = _parameter(200.0, "l_max", "m", _positive)
-    altitude: float = _parameter(80.0, "h", "m", _positive)
-    eavesdropper_altitude: float = _parameter(120.0, "h_e", "m", _positive)
-    coverage_radius: float = _parameter(45.0, "D_max", "m", _non_negative)
-    max_speed: float = _parameter(20.0, "v_max", "m/s", _positive)
-    speed_limit: str = _parameter("box", "", "", _speed_limit)
-    off_map_penalty: float = _parameter(0.2, "r_om", "bps/Hz", _non_negative)
-    helper_mass: float = _parameter(9.65, "M", "kg", _positive)
-    ue_power: float = _parameter(0.1, "p_u", "W", _non_negative)
-    jamming_power: float = _parameter(0.08, "p_J", "W", _non_negative)
-    relay_power: float = _parameter(0.012, "p_R", "W", _non_negative)
-    noise_power: float = _parameter(1e-13, "sigma^2", "W", _positive)
-    ground_to_air_gain: float = _parameter(1e-5, "beta_0", "", _non_negative)
-    air_to_air_gain: float = _parameter(1e-4, "beta_1", "", _non_negative)
-    ground_to_air_k_factor: float = _parameter(12.0, "K^G2A", "dB", _number())
-    air_to_air_k_factor: float = _parameter(20.0, "K^A2A", "dB", _number())
-    fading: bool = _parameter(True, "", "", _switch)
-    min_secrecy_rate: float = _parameter(0.1, "epsilon", "bps/Hz", _non_negative)
-    task_size: tuple[float, float] = _parameter((160e3, 240e3), "S_u", "bit", _range)
-    cycles_per_bit: tuple[float, float] = _parameter((1e3, 1.2e3), "F_u", "cycle/bit", _range)
-    capacitance: float = _parameter(1e-27, "kappa", "", _non_negative)
-    ue_energy_budget: float = _parameter(0.025, "E_u", "J", _non_negative)
-    edge_energy_budget: float = _parameter(24.0, "E_L", "J", _non_negative)
-    helper_energy_budget: float = _parameter(3900.0, "E_H", "J", _non_negative)
+    ue_positions: tuple[Point, ...] = parameter(_points, symbol="(x_u, y_u)", unit="m")
+    legitimate_position: Point = parameter(_point, (0.0, 0.0), symbol="(x_L, y_L)", unit="m")
+    eavesdropper_position: Point = parameter(_point, (80.0, 80.0), symbol="(x_E, y_E)", unit="m")
+    helper_start: Point = parameter(_point, (-60.0, -60.0), symbol="(x_H(0), y_H(0))", unit="m")
+    num_slots: int = parameter(count(), 20, symbol="T")
+    slot_duration: float = parameter(_positive, 1.0, symbol="Delta", unit="s")
+    map_side: float = parameter(_positive, 200.0, symbol="l_max", unit="m")
+    altitude: float = parameter(_positive, 80.0, symbol="h", unit="m")
+    eavesdropper_altitude: float = parameter(_positive, 120.0, symbol="h_e", unit="m")
+    coverage_radius: float = parameter(_non_negative, 45.0, symbol="D_max", unit="m")
+    max_speed: float = parameter(_positive, 20.0, symbol="v_max", unit="m/s")
+    speed_limit: str = parameter(choice("box", "disc"), "box")
+    off_map_penalty: float = parameter(_non_negative, 0.2, symbol="r_om", unit="bps/Hz")
+    helper_mass: float = parameter(_positive, 9.65, symbol="M", unit="kg")
+    ue_power: float = parameter(_non_negative, 0.1, symbol="p_u", unit="W")
+    jamming_power: float = parameter(_non_negative, 0.08, symbol="p_J", unit="W")
+    relay_power: float = parameter(_non_negative, 0.012, symbol="p_R", unit="W")
+    noise_power: float = parameter(_positive, 1e-13, symbol="sigma^2", unit="W")
+    ground_to_air_gain: float = parameter(_non_negative, 1e-5, symbol="beta_0")
+    air_to_air_gain: float = parameter(_non_negative, 1e-4, symbol="beta_1")
+    ground_to_air_k_factor: float = parameter(_decibel, 12.0, symbol="K^G2A", unit="dB")
+    air_to_air_k_factor: float = parameter(_decibel, 20.0, symbol="K^A2A", unit="dB")
+    fading: bool = parameter(switch, True)
+    min_secrecy_rate: float = parameter(_non_negative, 0.1, symbol="epsilon", unit="bps/Hz")
+    task_size: tuple[float, float] = parameter(_range, (160e3, 240e3), symbol="S_u", unit="bit")
+    cycles_per_bit: tuple[float, float] = parameter(
+        _range, (1000.0, 1200.0), symbol="F_u", unit="cycle/bit"
+    )
+    capacitance: float = parameter(_non_negative, 1e-27, symbol="kappa")
+    ue_energy_budget: float = parameter(_non_negative, 0.025, symbol="E_u", unit="J")
+    edge_energy_budget: float = parameter(_non_negative, 24.0, symbol="E_L", unit="J")
+    helper_energy_budget: float = parameter(_non_negative, 3900.0, symbol="E_H", unit="J")
 
     def __post_init__(self) -> None:
-        for parameter in dataclasses.fields(self):
-            value = getattr(self, parameter.name)
-            converted = parameter.metadata["convert"](parameter.name, value)
-            object.__setattr__(self, parameter.name, converted)
+        super().__post_init__()
         for name in ("legitimate_position", "eavesdropper_position", "helper_start"):
             self._require_on_map(name, getattr(self, name))
         for index, position in enumerate(self.ue_positions):
@@ -197,47 +114,3 @@ class Scenario:
         """
         require_choice("scenario", name, PRESETS)
         return cls(ue_positions=PRESETS[name])
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Build a scenario from plain values, such as a parsed YAML file or command line.
-
-        Raises:
-            InputError: an unknown, missing or unacceptable field.
-        """
-        known = [parameter.name for parameter in dataclasses.fields(cls)]
-        for name in values:
-            if name not in known:
-                similar = difflib.get_close_matches(str(name), known, n=1)
-                hint = f"did you mean {similar[0]!r}?" if similar else f"one of {', '.join(known)}"
-                raise InputError(f"scenario: unknown field {name!r}: {hint}")
-        if "ue_positions" not in values:
-            accepted = "at least one pair of coordinates (x, y) in metres"
-            raise InputError(f"ue_positions is missing: expected {accepted}")
-        return cls(**values)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values (numbers, strings, lists), as :meth:`from_dict` takes them."""
-        values = dataclasses.asdict(self)
-        values["ue_positions"] = [list(position) for position in self.ue_positions]
-        return {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}
-
-    def save(self, path: str | Path) -> None:
-        """Write the scenario as YAML."""
-        OmegaConf.save(OmegaConf.create(self.to_dict()), path)
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a scenario from a YAML file that :meth:`save` or a person wrote.
-
-        Raises:
-            InputError: no such file, not YAML, or not a scenario.
-        """
-        try:
-            values = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
-        except (OSError, YAMLError, OmegaConfBaseException, UnicodeDecodeError) as error:
-            reason = " ".join(str(error).split())
-            raise InputError(f"scenario file {str(path)!r}: cannot be read ({reason})") from None
-        if not isinstance(values, dict):
-            raise InputError(f"scenario file {str(path)!r}: expected fields with values")
-        return cls.from_dict({str(name): value for name, value in values.items()})

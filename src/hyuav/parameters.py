@@ -1,0 +1,196 @@
+"""Immutable records of parameters that check themselves and speak in one line."""
+
+import dataclasses
+import difflib
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
+
+from hyuav.errors import InputError, InputTypeError, rejection, require_choice
+
+Converter = Callable[[str, Any], Any]
+"""Takes a field's name and a value; returns the value as it is kept, or raises InputError."""
+
+
+def number(
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    above: float | None = None,
+) -> Converter:
+    """Accept finite numbers in [low, high], or above ``above``."""
+    accepted = "a finite number"
+    if above is not None:
+        accepted += f" > {above:g}"
+    elif math.isfinite(low) and math.isfinite(high):
+        accepted = f"a number in [{low:g}, {high:g}]"
+    elif math.isfinite(low):
+        accepted += f" >= {low:g}"
+
+    def convert(name: str, value: Any) -> float:
+        if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
+            raise InputTypeError(rejection(name, value, accepted))
+        try:
+            result = float(value)
+        except (TypeError, ValueError, RuntimeError, OverflowError):
+            raise InputTypeError(rejection(name, value, accepted)) from None
+        inside = low <= result <= high and (above is None or result > above)
+        if not (math.isfinite(result) and inside):
+            raise InputError(rejection(name, value, accepted))
+        return result
+
+    return convert
+
+
+def count(low: int = 1) -> Converter:
+    """Accept whole numbers that are at least ``low``."""
+    accepted = f"a whole number >= {low}"
+
+    def convert(name: str, value: Any) -> int:
+        if isinstance(value, bool) or not hasattr(value, "__index__"):
+            raise InputTypeError(rejection(name, value, accepted))
+        try:
+            result = int(value.__index__())
+        except TypeError:
+            raise InputTypeError(rejection(name, value, accepted)) from None
+        if result < low:
+            raise InputError(rejection(name, value, accepted))
+        return result
+
+    return convert
+
+
+def switch(name: str, value: Any) -> bool:
+    """Accept true and false."""
+    if not isinstance(value, bool):
+        raise InputTypeError(rejection(name, value, "true or false"))
+    return value
+
+
+def choice(*choices: str) -> Converter:
+    """Accept one of ``choices``."""
+
+    def convert(name: str, value: Any) -> str:
+        require_choice(name, value, choices)
+        return str(value)
+
+    return convert
+
+
+def sequence(element: Converter, accepted: str, *, length: int | None = None) -> Converter:
+    """Accept lists, tuples, arrays and tensors of at least one element; keep them as tuples."""
+
+    def convert(name: str, value: Any) -> tuple[Any, ...]:
+        items = value.tolist() if hasattr(value, "tolist") else value
+        if not isinstance(items, list | tuple):
+            raise InputTypeError(rejection(name, value, accepted))
+        if not items or (length is not None and len(items) != length):
+            raise InputError(rejection(name, value, accepted))
+        return tuple(element(f"{name}[{index}]", item) for index, item in enumerate(items))
+
+    return convert
+
+
+def increasing_pair(low: float) -> Converter:
+    """Accept two numbers (first, last) with low <= first <= last."""
+    accepted = f"two numbers (low, high) with {low:g} <= low <= high"
+    pair = sequence(number(low), accepted, length=2)
+
+    def convert(name: str, value: Any) -> tuple[float, float]:
+        first, last = pair(name, value)
+        if first > last:
+            raise InputError(rejection(name, value, accepted))
+        return first, last
+
+    return convert
+
+
+def parameter(
+    convert: Converter, default: Any = dataclasses.MISSING, *, symbol: str = "", unit: str = ""
+) -> Any:
+    """Declare a field of :class:`Parameters`: its check, default, paper symbol and unit."""
+    metadata = {"convert": convert, "symbol": symbol, "unit": unit}
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def refuse_unknown(owner: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Accept only names that are known.
+
+    Raises:
+        InputError: naming the unknown one and the most similar known one.
+    """
+    known = list(known)
+    for name in names:
+        if name not in known:
+            similar = difflib.get_close_matches(str(name), known, n=1)
+            hint = f"did you mean {similar[0]!r}?" if similar else f"one of {', '.join(known)}"
+            raise InputError(f"{owner}: unknown field {name!r}: {hint}")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """A record whose fields, declared with :func:`parameter`, are checked on creation.
+
+    Raises:
+        InputError: (a ``ValueError``) a value out of its range.
+        InputTypeError: (also a ``TypeError``) a value of the wrong type.
+    """
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            converted = field.metadata["convert"](field.name, getattr(self, field.name))
+            object.__setattr__(self, field.name, converted)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Build the record from plain values, such as a parsed YAML file or command line.
+
+        Raises:
+            InputError: an unknown, missing or unacceptable field.
+        """
+        owner = cls.__name__.lower()
+        fields = dataclasses.fields(cls)
+        refuse_unknown(owner, values, [field.name for field in fields])
+        for field in fields:
+            if field.default is dataclasses.MISSING and field.name not in values:
+                raise InputError(f"{owner}: {field.name} is missing")
+        return cls(**values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values (numbers, strings, lists), as :meth:`from_dict` takes them."""
+        return {
+            field.name: _as_lists(getattr(self, field.name)) for field in dataclasses.fields(self)
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write the record as YAML."""
+        OmegaConf.save(OmegaConf.create(self.to_dict()), path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a record from a YAML file that :meth:`save` or a person wrote.
+
+        Raises:
+            InputError: no such file, not YAML, or not such a record.
+        """
+        file = f"{cls.__name__.lower()} file {str(path)!r}"
+        try:
+            values = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
+        except (OSError, YAMLError, OmegaConfBaseException, UnicodeDecodeError) as error:
+            reason = " ".join(str(error).split())
+            raise InputError(f"{file}: cannot be read ({reason})") from None
+        if not isinstance(values, dict):
+            raise InputError(f"{file}: expected fields with values")
+        return cls.from_dict({str(name): value for name, value in values.items()})
+
+
+def _as_lists(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_as_lists(item) for item in value]
+    return value
