@@ -1,0 +1,104 @@
+"""SAC: a stochastic actor with a learned temperature (Haarnoja et al., 2018)."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import NormalParamExtractor, TensorDictModule, TensorDictSequential
+from torch import Tensor, nn
+from torchrl.modules import ProbabilisticActor, TanhNormal
+from torchrl.objectives import SACLoss, SoftUpdate, ValueEstimators
+
+from hyuav.learning.algorithms.base import (
+    Algorithm,
+    AlgorithmParameters,
+    GradientStep,
+    adam,
+)
+from hyuav.learning.networks import LearnerMLP, make_critic
+from hyuav.parameters import number, parameter
+
+
+class LearnerSACLoss(SACLoss):
+    """TorchRL's SAC loss with a temperature of its own for each learner."""
+
+    def __init__(self, *networks: Any, learners: int, alpha_init: float, **options: Any) -> None:
+        super().__init__(*networks, alpha_init=alpha_init, **options)
+        # (N, 1) broadcasts against the log-probabilities (N, K) of a mini-batch.
+        self.log_alpha = nn.Parameter(torch.full((learners, 1), math.log(alpha_init)))
+        self._against_values = False
+
+    @property
+    def _alpha(self) -> Tensor:
+        alpha: Tensor = super()._alpha
+        return alpha.unsqueeze(-1) if self._against_values else alpha
+
+    def _compute_target_v2(self, tensordict: TensorDictBase) -> Tensor:
+        # The target subtracts the temperature times the log-probability from values (N, K, 1).
+        self._against_values = True
+        try:
+            return super()._compute_target_v2(tensordict)
+        finally:
+            self._against_values = False
+
+    def actor_and_temperature_loss(self, batch: TensorDictBase) -> Tensor:
+        """Both losses (N, K) from one sample of actions; neither's gradient reaches the other."""
+        actor_loss, metadata = self.actor_loss(batch)
+        return actor_loss + self._alpha_loss(metadata["log_prob"])
+
+
+@dataclass(frozen=True)
+class SAC(AlgorithmParameters):
+    """SAC's hyperparameters beside the common ones; the target entropy is minus dim(a)."""
+
+    temperature_learning_rate: float = parameter(number(above=0.0), 3e-4)
+    temperature_init: float = parameter(number(above=0.0), 0.2)
+    target_entropy: float = parameter(number(), -2.0)
+
+    def build(self, learners: int, observation_size: int) -> Algorithm:
+        """See :meth:`AlgorithmParameters.build`."""
+        network = LearnerMLP(learners, observation_size, self.hidden_sizes, 4, self.activation)
+        distribution = TensorDictModule(
+            nn.Sequential(network, NormalParamExtractor()),
+            in_keys=["observation"],
+            out_keys=["loc", "scale"],
+        )
+        explorer = ProbabilisticActor(
+            distribution,
+            in_keys=["loc", "scale"],
+            distribution_class=TanhNormal,
+            distribution_kwargs={"tanh_loc": False},
+            return_log_prob=True,
+        )
+        loss = LearnerSACLoss(
+            explorer,
+            make_critic(learners, observation_size, self.hidden_sizes, self.activation),
+            learners=learners,
+            alpha_init=self.temperature_init,
+            num_qvalue_nets=2,
+            target_entropy=self.target_entropy,
+            loss_function="l2",
+            reduction="none",
+            scalar_output_mode="exclude",
+        )
+        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
+        critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
+        actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
+        actor_optimizer.add_param_group(
+            {"params": [loss.log_alpha], "lr": self.temperature_learning_rate}
+        )
+        mean = TensorDictModule(nn.Tanh(), in_keys=["loc"], out_keys=["action"])
+        return Algorithm(
+            actor=TensorDictSequential(distribution, mean),
+            explorer=explorer,
+            loss=loss,
+            steps=(
+                GradientStep(
+                    "critic", lambda batch: loss.qvalue_v2_loss(batch)[0], critic_optimizer
+                ),
+                GradientStep("actor", loss.actor_and_temperature_loss, actor_optimizer),
+            ),
+            target=SoftUpdate(loss, tau=self.target_rate),
+        )

@@ -1,0 +1,56 @@
+"""TD3: DDPG with twin critics, smoothed targets and a slower actor (Fujimoto et al., ICML 2018)."""
+
+from dataclasses import dataclass
+
+from tensordict.nn import TensorDictSequential
+from torchrl.objectives import SoftUpdate, TD3Loss, ValueEstimators
+
+from hyuav.learning.algorithms.base import Algorithm, GradientStep, adam
+from hyuav.learning.algorithms.ddpg import DDPG
+from hyuav.learning.exploration import GaussianNoise
+from hyuav.learning.networks import make_actor, make_critic
+from hyuav.parameters import count, number, parameter
+
+
+@dataclass(frozen=True)
+class TD3(DDPG):
+    """DDPG's hyperparameters and TD3's own three."""
+
+    target_noise_std: float = parameter(number(0.0), 0.2)
+    target_noise_clip: float = parameter(number(0.0), 0.5)
+    actor_every: int = parameter(count(), 2)
+
+    def build(self, learners: int, observation_size: int) -> Algorithm:
+        """See :meth:`AlgorithmParameters.build`."""
+        sizes = (learners, observation_size, self.hidden_sizes, self.activation)
+        actor, critic = make_actor(*sizes), make_critic(*sizes)
+        loss = TD3Loss(
+            actor,
+            critic,
+            bounds=(-1.0, 1.0),
+            num_qvalue_nets=2,
+            policy_noise=self.target_noise_std,
+            noise_clip=self.target_noise_clip,
+            loss_function="l2",
+            reduction="none",
+        )
+        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
+        noise = GaussianNoise(learners, self.noise_variance, self.noise_decay, self.noise_decay_per)
+        critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
+        actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
+        return Algorithm(
+            actor=actor,
+            explorer=TensorDictSequential(actor, noise),
+            loss=loss,
+            steps=(
+                GradientStep("critic", lambda batch: loss.value_loss(batch)[0], critic_optimizer),
+                GradientStep(
+                    "actor",
+                    lambda batch: loss.actor_loss(batch)[0],
+                    actor_optimizer,
+                    every=self.actor_every,
+                ),
+            ),
+            target=SoftUpdate(loss, tau=self.target_rate),
+            target_every=self.actor_every,
+        )

@@ -1,0 +1,49 @@
+"""Checkpoint files: written whole or not at all, read without running code from them."""
+
+import pickle
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from hyuav.errors import InputError, rejection
+
+FORMAT = "hyuav-checkpoint-1"
+
+
+def save_checkpoint(path: Path, kind: str, content: dict[str, Any]) -> None:
+    """Write tensors and plain values; an interrupted write leaves an older file as it was.
+
+    Args:
+        path: of the file.
+        kind: what it holds, "training" or "weights"; a reader asks for it by this word.
+        content: tensors and plain values, nested in dicts, lists and tuples.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.partial")
+    torch.save({"format": FORMAT, "kind": kind, "content": content}, partial)
+    partial.replace(path)
+
+
+def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "cpu") -> Any:
+    """Read what :func:`save_checkpoint` wrote under the same ``kind``.
+
+    Raises:
+        InputError: no such file, a truncated or foreign one, or one of another kind.
+    """
+    accepted = f"a checkpoint of kind {kind!r} written by hyuav"
+    try:
+        stored = torch.load(path, map_location=device, weights_only=True)
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})")) from None
+    except (RuntimeError, ValueError, EOFError, KeyError, pickle.PickleError, zipfile.BadZipFile):
+        reason = "not a checkpoint, or truncated"
+        raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})")) from None
+    if not isinstance(stored, dict) or stored.get("format") != FORMAT:
+        raise InputError(rejection("checkpoint", str(path), f"{accepted} (another program's)"))
+    if stored.get("kind") != kind:
+        reason = f"this one is of kind {stored.get('kind')!r}"
+        raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})"))
+    return stored["content"]

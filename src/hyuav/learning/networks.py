@@ -1,0 +1,106 @@
+"""Actors and critics of many independent learners, stacked along a leading axis."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import torch
+from tensordict.nn import TensorDictModule
+from torch import Tensor, nn
+
+ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
+
+
+class LearnerLinear(nn.Module):
+    """One fully connected layer for each learner, applied as one batched product.
+
+    Weights start as those of :class:`torch.nn.Linear`, drawn anew for each learner.
+
+    Args:
+        learners: N, the length of the learner axis.
+        in_features: of each learner's layer.
+        out_features: of each learner's layer.
+    """
+
+    def __init__(self, learners: int, in_features: int, out_features: int) -> None:
+        super().__init__()
+        bound = 1.0 / math.sqrt(in_features)
+        self.weight = nn.Parameter(torch.empty(learners, in_features, out_features))
+        self.bias = nn.Parameter(torch.empty(learners, 1, out_features))
+        for values in (self.weight, self.bias):
+            nn.init.uniform_(values, -bound, bound)
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        """Map (N, K, in_features) to (N, K, out_features)."""
+        return torch.baddbmm(self.bias, inputs, self.weight)
+
+
+class LearnerMLP(nn.Module):
+    """One multilayer perceptron for each learner.
+
+    Args:
+        learners: N.
+        in_features: of the input.
+        hidden_sizes: of the hidden layers.
+        out_features: of the output.
+        activation: of the hidden layers, a name of :data:`ACTIVATIONS`.
+        output: applied to the last layer's result, if any.
+    """
+
+    def __init__(
+        self,
+        learners: int,
+        in_features: int,
+        hidden_sizes: Sequence[int],
+        out_features: int,
+        activation: str,
+        output: nn.Module | None = None,
+    ) -> None:
+        super().__init__()
+        sizes = [in_features, *hidden_sizes]
+        layers: list[nn.Module] = []
+        for before, after in itertools.pairwise(sizes):
+            layers += [LearnerLinear(learners, before, after), ACTIVATIONS[activation]()]
+        layers.append(LearnerLinear(learners, sizes[-1], out_features))
+        if output is not None:
+            layers.append(output)
+        self.layers = nn.Sequential(*layers)
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Map inputs (N, ..., k) that join to ``in_features`` to (N, ..., out_features).
+
+        A single slot of each learner, (N, k), is taken as well.
+        """
+        joined = inputs[0] if len(inputs) == 1 else torch.cat(inputs, dim=-1)
+        learners, features = joined.shape[0], joined.shape[-1]
+        outputs = self.layers(joined.reshape(learners, -1, features))
+        return outputs.reshape(*joined.shape[:-1], outputs.shape[-1])
+
+
+def make_critic(
+    learners: int, observation_size: int, hidden_sizes: Sequence[int], activation: str
+) -> TensorDictModule:
+    """Q(s, a) of N learners.
+
+    Reads ``observation`` (N, ..., U + 5) and ``action`` (N, ..., 2), writes
+    ``state_action_value`` (N, ..., 1).
+    """
+    return TensorDictModule(
+        LearnerMLP(learners, observation_size + 2, hidden_sizes, 1, activation),
+        in_keys=["observation", "action"],
+        out_keys=["state_action_value"],
+    )
+
+
+def make_actor(
+    learners: int, observation_size: int, hidden_sizes: Sequence[int], activation: str
+) -> TensorDictModule:
+    """mu(s) of N learners.
+
+    Reads ``observation`` (N, ..., U + 5), writes ``action`` (N, ..., 2) in [-1, 1] by a tanh.
+    """
+    return TensorDictModule(
+        LearnerMLP(learners, observation_size, hidden_sizes, 2, activation, nn.Tanh()),
+        in_keys=["observation"],
+        out_keys=["action"],
+    )

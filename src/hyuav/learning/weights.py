@@ -1,0 +1,56 @@
+"""Copy, replace and hand over the weights of single learners on the learner axis.
+
+Stacked weights have the learner axis third from the end (:class:`LearnerLinear`; twin critics
+add one axis in front), and a learner's temperature has it in front of one more axis.
+"""
+
+import torch
+from torch import Tensor
+from torchrl.objectives import LossModule
+
+from hyuav.errors import InputError
+
+
+def _learner_axis(weights: Tensor) -> int:
+    return -min(weights.ndim, 3)
+
+
+def copy_weights(loss: LossModule) -> dict[str, Tensor]:
+    """A copy of all networks and targets of N learners, by name, without hyperparameters."""
+    return {
+        name: values.detach().clone() for name, values in loss.state_dict().items() if values.ndim
+    }
+
+
+def replace_learners(weights: dict[str, Tensor], by: dict[str, Tensor], where: Tensor) -> None:
+    """Overwrite, in ``weights``, the learners for which ``where`` (N,) is true."""
+    for name, values in weights.items():
+        mask = where.reshape(-1, *(1,) * (min(values.ndim, 3) - 1))
+        values.copy_(torch.where(mask, by[name], values))
+
+
+def select_learner(weights: dict[str, Tensor], learner: int) -> dict[str, Tensor]:
+    """The weights of one learner, with a learner axis of length one."""
+    return {
+        name: values.narrow(_learner_axis(values), learner, 1) for name, values in weights.items()
+    }
+
+
+def load_weights(loss: LossModule, weights: dict[str, Tensor]) -> None:
+    """Put weights into the networks and targets; those of one learner serve all.
+
+    Raises:
+        InputError: other names or other shapes than the networks have.
+    """
+    own = copy_weights(loss)
+    if own.keys() != weights.keys():
+        raise InputError("checkpoint: its networks are not those of this algorithm")
+    expanded = {}
+    for name, values in weights.items():
+        try:
+            expanded[name] = values.expand_as(own[name])
+        except RuntimeError:
+            expected = f"{tuple(own[name].shape)} or one learner's"
+            shape = tuple(values.shape)
+            raise InputError(f"checkpoint: {name} has shape {shape}: expected {expected}") from None
+    loss.load_state_dict(expanded, strict=False)
