@@ -1,0 +1,65 @@
+"""Evaluate saved runs against the reference schemes and the optimum, offline.
+
+python recipes/evaluate.py run=runs/NAME
+python recipes/evaluate.py run=[runs/HYBRID,runs/RELAY,runs/JAMMING]
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+from hyuav.configuration import Config, recipe, section
+from hyuav.errors import InputError, rejection
+from hyuav.evaluation import EvaluationParameters, evaluate
+from hyuav.experiment import learned_policies, print_results, reference_policies
+from hyuav.figures import flight_map, save_figure
+from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text
+from hyuav.runs import RunDirectory
+
+
+@dataclass(frozen=True)
+class Evaluate(Parameters):
+    """What to evaluate and where to."""
+
+    run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "run directories")), None)
+    output: str | None = parameter(optional(text), None)
+    device: str = parameter(text, "cpu")
+    threads: int = parameter(count(), 2)
+
+
+@recipe(
+    "evaluate",
+    Evaluate,
+    groups={},
+    sections={"evaluation": EvaluationParameters},
+    run_directory=".",
+)
+def main(config: Config, _: Path) -> None:
+    """Evaluate, print the table, and keep it beside the first run's other files."""
+    options = section(config, Evaluate)
+    parameters = EvaluationParameters.from_dict(config["evaluation"])
+    if options.run is None:
+        raise InputError("run is missing: expected run=DIRECTORY, or run=[DIRECTORY,...]")
+    torch.set_num_threads(options.threads)
+    runs = [RunDirectory(path) for path in options.run]
+    first = runs[0].configuration()
+    for run in runs[1:]:
+        if run.configuration().scenario != first.scenario:
+            raise InputError(rejection("run", str(run.path), f"the scenario of {runs[0].path}"))
+    console = Console()
+    policies = {
+        **learned_policies(runs, first.scenario),
+        **reference_policies(first.scenario, parameters.resolution, console),
+    }
+    evaluation = evaluate(first.scenario, first.scenario_name, policies, parameters, options.device)
+    output = runs[0].path if options.output is None else Path(options.output)
+    evaluation.save(output)
+    save_figure(flight_map(first.scenario, evaluation.flights), output / "figures", "flight_map")
+    print_results(evaluation, console)
+    console.print(f"evaluation: {output}", soft_wrap=True)
+
+
+if __name__ == "__main__":
+    main()

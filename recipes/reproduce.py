@@ -1,0 +1,80 @@
+"""The main job: train Proposed, Re-OT and Ja-OT, and set them beside the references.
+
+python recipes/reproduce.py
+python recipes/reproduce.py scenario=random_disk training.num_episodes=600
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+from hyuav.configuration import Config, recipe, section
+from hyuav.evaluation import EvaluationParameters, evaluate
+from hyuav.experiment import (
+    draw_figures,
+    learned_policies,
+    print_results,
+    reference_policies,
+    train,
+)
+from hyuav.learning.training import TrainingParameters
+from hyuav.parameters import Parameters, count, parameter, text
+from hyuav.runs import RunConfiguration, named_algorithm, named_scenario
+from hyuav.tracking import LoggerParameters
+
+
+@dataclass(frozen=True)
+class Reproduce(Parameters):
+    """How the main job is done."""
+
+    seeds: int = parameter(count(), 1)
+    seed: int = parameter(count(0), 0)
+    device: str = parameter(text, "cpu")
+    threads: int = parameter(count(), 2)
+
+
+@recipe(
+    "reproduce",
+    Reproduce,
+    groups={"scenario": "two_clusters", "algorithm": "ddpg"},
+    sections={
+        "training": TrainingParameters,
+        "evaluation": EvaluationParameters,
+        "logger": LoggerParameters,
+    },
+    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_reproduce_${scenario.name}",
+)
+def main(config: Config, directory: Path) -> None:
+    """Train the three learned schemes side by side, evaluate all eight, draw the figures."""
+    options = section(config, Reproduce)
+    torch.set_num_threads(options.threads)
+    parameters = EvaluationParameters.from_dict(config["evaluation"])
+    logger = LoggerParameters.from_dict(config["logger"])
+    scenario_name, scenario = named_scenario(config["scenario"])
+    algorithm_name, algorithm = named_algorithm(config["algorithm"])
+    configuration = RunConfiguration(
+        scenario_name,
+        scenario,
+        tuple(scheme for scheme in ("hybrid", "relay", "jamming") for _ in range(options.seeds)),
+        algorithm_name,
+        algorithm,
+        TrainingParameters.from_dict(config["training"]),
+        options.seed,
+    )
+    console = Console()
+    run = train(directory, configuration, logger, console, device=options.device)
+    policies = {
+        **learned_policies([run], scenario),
+        **reference_policies(scenario, parameters.resolution, console),
+    }
+    evaluation = evaluate(scenario, scenario_name, policies, parameters, options.device)
+    evaluation.save(run.path)
+    draw_figures(run.figures, scenario, evaluation, run.metrics())
+    print_results(evaluation, console)
+    console.print(f"figures: {run.figures}", soft_wrap=True)
+
+
+if __name__ == "__main__":
+    main()

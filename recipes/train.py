@@ -1,0 +1,71 @@
+"""Train learners and keep the run.
+
+python recipes/train.py scenario=two_clusters scheme=hybrid algorithm=ddpg seed=0
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+from hyuav.configuration import Config, recipe, section
+from hyuav.experiment import train
+from hyuav.learning.training import TrainingParameters
+from hyuav.parameters import Parameters, choice, count, optional, parameter, text
+from hyuav.runs import RunConfiguration, named_algorithm, named_scenario
+from hyuav.system import SCHEMES
+from hyuav.tracking import LoggerParameters
+
+
+@dataclass(frozen=True)
+class Train(Parameters):
+    """What to train, besides the scenario, the algorithm and its training."""
+
+    scheme: str = parameter(choice(*SCHEMES), "hybrid")
+    learners: int = parameter(count(), 1)
+    seed: int = parameter(count(0), 0)
+    device: str = parameter(text, "cpu")
+    threads: int = parameter(count(), 1)
+    warm_start: str | None = parameter(optional(text), None)
+
+
+@recipe(
+    "train",
+    Train,
+    groups={"scenario": "two_clusters", "algorithm": "ddpg"},
+    sections={"training": TrainingParameters, "logger": LoggerParameters},
+    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${scenario.name}_${scheme}_${algorithm.name}",
+)
+def main(config: Config, directory: Path) -> None:
+    """Train, and say where the run is."""
+    options = section(config, Train)
+    torch.set_num_threads(options.threads)
+    scenario_name, scenario = named_scenario(config["scenario"])
+    algorithm_name, algorithm = named_algorithm(config["algorithm"])
+    configuration = RunConfiguration(
+        scenario_name,
+        scenario,
+        (options.scheme,) * options.learners,
+        algorithm_name,
+        algorithm,
+        TrainingParameters.from_dict(config["training"]),
+        options.seed,
+    )
+    console = Console()
+    run = train(
+        directory,
+        configuration,
+        LoggerParameters.from_dict(config["logger"]),
+        console,
+        device=options.device,
+        warm_start=options.warm_start,
+    )
+    best = run.metrics()["best_evaluation"].dropna().tail(options.learners)
+    returns = ", ".join(f"{value:.2f}" for value in best)
+    console.print(f"best noise-free accumulated reward (bps/Hz): {returns}")
+    console.print(f"run: {run.path}", soft_wrap=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""Hydra for the recipes: typed defaults by name, and one line for every mistake."""
+
+import dataclasses
+import logging
+import os
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import hydra
+from hydra.core.config_store import ConfigStore
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from hyuav.errors import InputError, require_choice
+from hyuav.learning.algorithms import ALGORITHMS
+from hyuav.parameters import Parameters, refuse_unknown
+from hyuav.scenario import PRESETS, Scenario
+
+Config = dict[str, Any]
+"""A composed configuration in plain values."""
+
+Record = TypeVar("Record", bound=Parameters)
+
+
+def register() -> None:
+    """Offer the presets and the algorithms as the groups ``scenario`` and ``algorithm``."""
+    store = ConfigStore.instance()
+    for name in PRESETS:
+        node = {"name": name, **Scenario.preset(name).to_dict()}
+        store.store(group="scenario", name=name, node=node)
+    for name, algorithm in ALGORITHMS.items():
+        node = {"name": name, **algorithm().to_dict()}
+        store.store(group="algorithm", name=name, node=node)
+
+
+def recipe(
+    name: str,
+    options: type[Parameters],
+    *,
+    groups: Mapping[str, str],
+    sections: Mapping[str, type[Parameters]],
+    run_directory: str,
+) -> Callable[[Callable[[Config, Path], None]], Callable[[], None]]:
+    """Turn a function into a command with Hydra's overrides.
+
+    The function is given the configuration in plain values, from which :func:`section` reads the
+    typed records, and the run's directory. Mistakes of the user end the command with one line
+    and exit status 2.
+
+    Args:
+        name: of the recipe.
+        options: the typed defaults at the top of the configuration.
+        groups: Hydra's groups and the member chosen by default.
+        sections: the typed defaults of the configuration's other sections.
+        run_directory: pattern of the directory in which a run keeps its files.
+    """
+    register()
+    store = ConfigStore.instance()
+    node: dict[str, Any] = options().to_dict()
+    node |= {section: parameters().to_dict() for section, parameters in sections.items()}
+    node["hydra"] = {
+        "run": {"dir": run_directory},
+        "sweep": {"dir": run_directory, "subdir": "${hydra.job.num}"},
+        "output_subdir": None,
+    }
+    node["defaults"] = [
+        *({group: member} for group, member in groups.items()),
+        {"override hydra/job_logging": "none"},
+        {"override hydra/hydra_logging": "none"},
+        "_self_",
+    ]
+    store.store(name=name, node=node)
+
+    def decorate(function: Callable[[Config, Path], None]) -> Callable[[], None]:
+        composed = False
+
+        def run(config: DictConfig) -> None:
+            nonlocal composed
+            composed = True
+            values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
+            assert isinstance(values, dict)
+            directory = Path(HydraConfig.get().runtime.output_dir)
+            function({str(key): value for key, value in values.items()}, directory)
+
+        def command() -> None:
+            os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the line below
+            logging.getLogger("torchrl").setLevel(logging.WARNING)
+            try:
+                hydra.main(version_base=None, config_path=None, config_name=name)(run)()
+            except (InputError, HydraException, OmegaConfBaseException) as error:
+                _refuse(explain(error))
+            except ValueError as error:
+                if composed:
+                    raise
+                _refuse(explain(error))
+            except KeyboardInterrupt:
+                print("interrupted", file=sys.stderr)
+                sys.exit(130)
+
+        return command
+
+    return decorate
+
+
+def section(config: Config, parameters: type[Record]) -> Record:
+    """Read a record from the entries of a configuration that bear its fields' names.
+
+    Raises:
+        InputError: an unacceptable value.
+    """
+    names = [field.name for field in dataclasses.fields(parameters)]
+    return parameters.from_dict({name: config[name] for name in names})
+
+
+def explain(error: Exception) -> str:
+    """One line that says what was wrong and what is accepted."""
+    cause = error.__cause__
+    if isinstance(error, MissingConfigException) and error.options is not None:
+        group, _, member = str(error.missing_cfg_file).rpartition("/")
+        members = list(error.options)
+        return _message(lambda: require_choice(group, member, members))
+    if isinstance(error, ConfigCompositionException) and isinstance(cause, OmegaConfBaseException):
+        known = cause.parent_node
+        if cause.full_key is not None and isinstance(known, DictConfig):
+            owner, _, key = cause.full_key.rpartition(".")
+            if key not in known:
+                names = [str(name) for name in known if name != "hydra"]
+                return _message(lambda: refuse_unknown(owner or "configuration", [key], names))
+        error = cause
+    text = str(error).split("\n    full_key")[0].split("\nSee https")[0]
+    return " ".join(text.split())
+
+
+def _refuse(line: str) -> NoReturn:
+    print(f"error: {line}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _message(check: Callable[[], None]) -> str:
+    try:
+        check()
+    except InputError as error:
+        return str(error)
+    raise AssertionError("the check was expected to fail")

@@ -1,0 +1,237 @@
+"""Fly any set of schemes through the same fading and account for each in one table."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import torch
+from scipy import stats
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+
+from hyuav.envs.transforms import make_env
+from hyuav.parameters import Parameters, count, number, parameter
+from hyuav.scenario import Scenario
+from hyuav.schemes.optimum import RESOLUTION
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+EVALUATION_FILE, FLIGHTS_FILE = "evaluation.json", "flights.parquet"
+
+LABELS = {
+    "proposed": "Proposed",
+    "ja_ot": "Ja-OT",
+    "re_ot": "Re-OT",
+    "re_lt": "Re-LT",
+    "ja_lt": "Ja-LT",
+    "optimum": "Optimum",
+    "ja_optimum": "Ja-optimum",
+    "re_optimum": "Re-optimum",
+}
+"""The schemes in the order of the table, with the names that the paper gives them."""
+
+MODE_RULES = {
+    "proposed": "hybrid",
+    "optimum": "hybrid",
+    "ja_ot": "jamming",
+    "ja_lt": "jamming",
+    "ja_optimum": "jamming",
+    "re_ot": "relay",
+    "re_lt": "relay",
+    "re_optimum": "relay",
+}
+"""Who chooses the helper's mode in each scheme, a name of :data:`hyuav.system.SCHEMES`."""
+
+OPTIMA = {"hybrid": "optimum", "jamming": "ja_optimum", "relay": "re_optimum"}
+"""The optimum that a scheme with this mode rule is measured against."""
+
+
+@dataclass(frozen=True)
+class EvaluationParameters(Parameters):
+    """How to evaluate."""
+
+    episodes: int = parameter(count(2), 1000)
+    flights: int = parameter(count(), 3)
+    seed: int = parameter(count(0), 10_000)
+    resolution: float = parameter(number(above=0.0), RESOLUTION, unit="m")
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A way to fly and what it needs to observe."""
+
+    module: TensorDictModuleBase
+    """Writes ``action`` (..., 2)."""
+    clock: bool = False
+    """Whether ``observation`` carries the slots flown."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a set of schemes brought in the same episodes."""
+
+    summary: dict[str, Any]
+    """The content of ``evaluation.json``."""
+    flights: pd.DataFrame
+    """A few episodes of each scheme, a row per slot."""
+
+    def save(self, directory: Path) -> None:
+        """Write ``evaluation.json`` and ``flights.parquet`` into ``directory``."""
+        directory.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(self.summary, indent=2)
+        (directory / EVALUATION_FILE).write_text(f"{text}\n", encoding="utf-8")
+        self.flights.to_parquet(directory / FLIGHTS_FILE)
+
+
+def evaluate(
+    scenario: Scenario,
+    name: str,
+    policies: Mapping[str, Sequence[Policy]],
+    parameters: EvaluationParameters,
+    device: torch.device | str | None = None,
+) -> Evaluation:
+    """Fly every scheme through the same draws of fading and tasks.
+
+    Args:
+        scenario: node positions and parameters.
+        name: of the scenario, for the record.
+        policies: by scheme, names of :data:`LABELS`: one or more, as from several seeds.
+            Fractions of the optimum are given where the optima are among them.
+        parameters: how many episodes, how many of them kept slot by slot, and the seed.
+        device: to fly on.
+    """
+    flown = {
+        scheme: torch.stack(
+            [
+                fly(scenario, scheme, policy, parameters.episodes, parameters.seed, device)
+                for policy in policies[scheme]
+            ]
+        )
+        for scheme in LABELS
+        if scheme in policies
+    }
+    returns = {
+        scheme: secrecy_sum_rate(data).sum(dim=-1).double().numpy()
+        for scheme, data in flown.items()
+    }
+    summary = {
+        "scenario": name,
+        "parameters": scenario.to_dict(),
+        "num_slots": scenario.num_slots,
+        "episodes": parameters.episodes,
+        "seed": parameters.seed,
+        "schemes": {
+            scheme: _returns(returns, scheme) | _account(data) for scheme, data in flown.items()
+        },
+    }
+    rows = [slot_table(scheme, data[0, : parameters.flights]) for scheme, data in flown.items()]
+    return Evaluation(summary, pd.concat(rows, ignore_index=True))
+
+
+@torch.no_grad()
+def fly(
+    scenario: Scenario,
+    scheme: str,
+    policy: Policy,
+    episodes: int,
+    seed: int,
+    device: torch.device | str | None = None,
+) -> TensorDictBase:
+    """What follows each slot of ``episodes`` flights, with diagnostics: (episodes, T)."""
+    env = make_env(
+        scenario, MODE_RULES[scheme], (episodes,), device, seed, True, clock=policy.clock
+    )
+    return env.rollout(scenario.num_slots, policy.module.to(env.device))["next"].cpu()
+
+
+def secrecy_sum_rate(flown: TensorDictBase) -> torch.Tensor:
+    """The secrecy sum-rate of each slot, without penalty: (episodes, T) bps/Hz."""
+    return flown["diagnostics", "secrecy_rate"].sum(dim=-1)
+
+
+def _returns(returns: Mapping[str, Array], scheme: str) -> dict[str, Any]:
+    """Mean return with its interval, and as a fraction of the optima flown in the same draws."""
+    own = returns[scheme]
+    mean = float(own.mean())
+    result: dict[str, Any] = {
+        "learners": len(own),
+        "secrecy_sum_rate": {"mean": mean, "ci95": confidence_interval(own)},
+    }
+    for field, optimum in (
+        ("fraction_of_optimum", OPTIMA[MODE_RULES[scheme]]),
+        ("fraction_of_hybrid_optimum", "optimum"),
+    ):
+        if optimum in returns and returns[optimum].mean() > 0:
+            result[field] = mean / float(returns[optimum].mean())
+    return result
+
+
+def confidence_interval(returns: Array) -> list[float]:
+    """The 95 % interval of the mean return by Student's t.
+
+    Args:
+        returns: (learners, episodes). Where several learners were flown, it is they that the
+            interval speaks of; with a single one, or a fixed flight, it speaks of the fading.
+
+    Returns:
+        the lower and the upper bound.
+    """
+    sample = returns.mean(axis=1) if len(returns) > 1 else returns[0]
+    if np.ptp(sample) == 0.0:
+        return [float(sample.mean())] * 2
+    interval = stats.t.interval(0.95, len(sample) - 1, sample.mean(), stats.sem(sample))
+    return [float(bound) for bound in interval]
+
+
+def _account(flown: TensorDictBase) -> dict[str, Any]:
+    """How the helper flew and what each node spent, per episode: (learners, episodes, T)."""
+    diagnostics = flown["diagnostics"]
+    per_episode = {
+        "off_map": flown["off_map"],
+        "budget_violations": diagnostics["budget_violation"],
+        "ue_energy": diagnostics["ue_energy"].mean(dim=-1, keepdim=True),
+        "edge_energy": diagnostics["edge_energy"],
+        "helper_energy": diagnostics["helper_energy"],
+    }
+    return {
+        "relay_share": float(flown["mode"].double().mean()),
+        "offloading_share": float(diagnostics["offloading"].double().mean()),
+        **{
+            name: float(values.double().sum(dim=(-2, -1)).mean())
+            for name, values in per_episode.items()
+        },
+    }
+
+
+def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
+    """Flights (episodes, T) as a table with a row per slot; lists hold one entry per UE."""
+    episodes, num_slots = flown.batch_size
+    diagnostics = flown["diagnostics"]
+    columns = {
+        "scheme": [scheme] * (episodes * num_slots),
+        "episode": np.repeat(np.arange(episodes), num_slots),
+        "slot": np.tile(np.arange(1, num_slots + 1), episodes),
+        "x": flown["position"][..., 0],
+        "y": flown["position"][..., 1],
+        "relay": flown["mode"] == 1,
+        "off_map": flown["off_map"],
+        "secrecy_sum_rate": secrecy_sum_rate(flown),
+        "relay_sum_rate": diagnostics["relay_sum_rate"],
+        "jamming_sum_rate": diagnostics["jamming_sum_rate"],
+        "edge_energy": diagnostics["edge_energy"],
+        "helper_energy": diagnostics["helper_energy"],
+        "budget_violation": diagnostics["budget_violation"],
+    }
+    table = pd.DataFrame(
+        {
+            name: values.flatten().numpy() if isinstance(values, torch.Tensor) else values
+            for name, values in columns.items()
+        }
+    )
+    for name in ("offloading", "secrecy_rate", "ue_energy"):
+        table[name] = diagnostics[name].flatten(0, 1).tolist()
+    return table

@@ -1,0 +1,178 @@
+"""What the recipes do: train into a run directory, gather the schemes, evaluate, draw."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pandas as pd
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from torch import Tensor
+
+from hyuav.errors import InputError
+from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
+from hyuav.figures import flight_map, learning_curves, save_figure, sum_rate_maps
+from hyuav.learning.checkpoint import load_checkpoint
+from hyuav.learning.training import Training
+from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.scenario import Scenario
+from hyuav.schemes.learned import LearnedPolicy
+from hyuav.schemes.linear import ConstantVelocity, ja_lt, re_lt
+from hyuav.schemes.optimum import FlightPolicy, solve
+from hyuav.tracking import LoggerParameters, Tracker
+
+LEARNED = {"hybrid": "proposed", "relay": "re_ot", "jamming": "ja_ot"}
+"""The learned scheme for each rule of who chooses the mode."""
+
+LINEAR: dict[str, Callable[[Scenario], ConstantVelocity]] = {"re_lt": re_lt, "ja_lt": ja_lt}
+
+
+def train(
+    directory: str | Path,
+    configuration: RunConfiguration,
+    logger: LoggerParameters,
+    console: Console,
+    *,
+    device: str | None = None,
+    warm_start: str | Path | None = None,
+) -> RunDirectory:
+    """Train as configured, reporting to a new run directory.
+
+    Args:
+        directory: of the run.
+        configuration: of the training.
+        logger: what Weights & Biases gets.
+        console: to show progress on.
+        device: to train on.
+        warm_start: a checkpoint, or a run directory whose best weights are meant, to begin with.
+
+    Raises:
+        InputError: the directory is taken, or the checkpoint does not fit.
+    """
+    training = Training(
+        configuration.scenario,
+        configuration.schemes,
+        configuration.algorithm,
+        configuration.training,
+        configuration.seed,
+        device,
+    )
+    if warm_start is not None:
+        training.warm_start(_weights_from(Path(warm_start)))
+    run = RunDirectory.create(directory, configuration)
+    with Tracker(run, configuration, training, logger, console) as tracker:
+        for episode in training.episodes():
+            tracker.log(episode)
+    return run
+
+
+def _weights_from(path: Path) -> dict[str, Tensor]:
+    file = RunDirectory(path).best_checkpoint if path.is_dir() else path
+    weights: dict[str, Tensor] = load_checkpoint(file, "weights")
+    return weights
+
+
+def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[str, list[Policy]]:
+    """The best actors of trainings, as Proposed, Re-OT and Ja-OT.
+
+    Raises:
+        InputError: a run or its checkpoint cannot be read, or its actors observe another number
+            of UEs than the scenario has.
+    """
+    policies: dict[str, list[Policy]] = {}
+    for run in runs:
+        configuration, weights = run.configuration(), run.best_weights()
+        clock = configuration.training.clock
+        for learner, scheme in enumerate(configuration.schemes):
+            module = LearnedPolicy(scenario, configuration.algorithm, weights, learner, clock=clock)
+            policies.setdefault(LEARNED[scheme], []).append(Policy(module, clock))
+    return policies
+
+
+def reference_policies(
+    scenario: Scenario, resolution: float, console: Console
+) -> dict[str, list[Policy]]:
+    """Re-LT, Ja-LT and the exact optimum of each mode rule.
+
+    A straight flight that is too fast for the horizon is left out, and the console says so.
+
+    Args:
+        scenario: to fly.
+        resolution: of the optimum's grid in m.
+        console: for what is left out.
+    """
+    policies = {}
+    for name, scheme in LINEAR.items():
+        try:
+            policies[name] = [Policy(scheme(scenario))]
+        except InputError as error:
+            console.print(f"{LABELS[name]} is left out: {error}")
+    for rule, optimum in solve(scenario, resolution=resolution).items():
+        policies[OPTIMA[rule]] = [Policy(FlightPolicy(optimum.path, scenario))]
+    return policies
+
+
+def print_results(evaluation: Evaluation, console: Console) -> None:
+    """Print the evaluation as a table that fits 80 columns."""
+    summary = evaluation.summary
+    title = (
+        f"{summary['scenario']}, T = {summary['num_slots']}: mean of {summary['episodes']} "
+        "episodes on the same fading, 95 % interval"
+    )
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("Scheme")
+    for heading in (
+        "Secrecy sum-rate\n(bps/Hz)",
+        "of own\noptimum",
+        "of hybrid\noptimum",
+        "slots\nrelayed",
+        "UEs off-\nloading",
+        "off\nmap",
+        "helper\n(kJ)",
+    ):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for scheme, result in summary["schemes"].items():
+        rate = result["secrecy_sum_rate"]
+        table.add_row(
+            LABELS[scheme],
+            "{:.2f} [{:.2f}, {:.2f}]".format(rate["mean"], *rate["ci95"]),
+            _percent(result.get("fraction_of_optimum")),
+            _percent(result.get("fraction_of_hybrid_optimum")),
+            _percent(result["relay_share"]),
+            _percent(result["offloading_share"]),
+            f"{result['off_map']:.1f}",
+            f"{result['helper_energy'] / 1e3:.1f}",
+        )
+    console.print(table)
+    for scheme, result in summary["schemes"].items():
+        if result["budget_violations"] > 0:
+            count = f"{result['budget_violations']:.2f}"
+            console.print(f"{LABELS[scheme]}: {count} energy budgets exceeded per episode")
+
+
+def _percent(fraction: float | None) -> str:
+    return "-" if fraction is None else f"{100 * fraction:.1f} %"
+
+
+def draw_figures(
+    directory: Path, scenario: Scenario, evaluation: Evaluation, metrics: pd.DataFrame
+) -> None:
+    """Write the learning curves, the flight map and the maps of the secrecy sum-rate.
+
+    Args:
+        directory: for the PNG and PDF files.
+        scenario: that was flown.
+        evaluation: whose flights are drawn and whose optima bound the curves.
+        metrics: a row per episode and learner.
+    """
+    results = evaluation.summary["schemes"]
+    curves: dict[str, pd.DataFrame] = {}
+    optima: dict[str, float] = {}
+    for scheme, rows in metrics.groupby("scheme"):
+        name = LEARNED[str(scheme)]
+        curves[name] = rows.pivot_table("accumulated_reward", "episode", "learner")
+        optima[name] = results[OPTIMA[str(scheme)]]["secrecy_sum_rate"]["mean"]
+    in_order = {name: curves[name] for name in LABELS if name in curves}
+    save_figure(learning_curves(in_order, optima), directory, "learning_curves")
+    save_figure(flight_map(scenario, evaluation.flights), directory, "flight_map")
+    save_figure(sum_rate_maps(scenario), directory, "sum_rate_maps")

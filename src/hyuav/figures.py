@@ -1,0 +1,146 @@
+"""The figures: learning curves, flights over the map, and maps of the secrecy sum-rate."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import torch
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hyuav.envs.rendering import OKABE_ITO, draw_flight, draw_scenario, mode_handles
+from hyuav.evaluation import LABELS
+from hyuav.scenario import Scenario
+from hyuav.system import SecureOffloadingSystem
+
+COLUMN_WIDTH, PAGE_WIDTH = 3.5, 7.16
+"""Inches of one column and of both columns of an IEEE page."""
+
+COLORS = {
+    "proposed": OKABE_ITO["bluish green"],
+    "ja_ot": OKABE_ITO["vermillion"],
+    "re_ot": OKABE_ITO["blue"],
+    "re_lt": OKABE_ITO["sky blue"],
+    "ja_lt": OKABE_ITO["orange"],
+    "optimum": OKABE_ITO["black"],
+}
+"""The same color for a scheme in every figure."""
+
+STYLE: Any = {
+    "font.size": 8,
+    "axes.linewidth": 0.6,
+    "axes.labelsize": 8,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "pdf.fonttype": 42,  # fonts that journals' submission checks accept
+    "savefig.dpi": 300,
+}
+
+SMOOTHING = 25
+"""Episodes over which a learning curve is averaged."""
+
+
+def save_figure(figure: Figure, directory: Path, name: str) -> None:
+    """Write the figure as ``name.png`` and ``name.pdf``."""
+    directory.mkdir(parents=True, exist_ok=True)
+    with mpl.rc_context(STYLE):
+        for suffix in ("png", "pdf"):
+            figure.savefig(directory / f"{name}.{suffix}")
+
+
+def learning_curves(
+    accumulated_reward: Mapping[str, pd.DataFrame], optima: Mapping[str, float]
+) -> Figure:
+    """Accumulated reward against episodes (the paper's Fig. 2), with the optimum of each scheme.
+
+    Args:
+        accumulated_reward: by scheme, a column per learner and a row per episode, in bps/Hz.
+        optima: by scheme, what the best flight earns on average, in bps/Hz.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
+        axes = figure.add_subplot()
+        for scheme, rewards in accumulated_reward.items():
+            color, episodes = COLORS[scheme], rewards.index
+            smooth = rewards.rolling(SMOOTHING, min_periods=1).mean()
+            axes.plot(episodes, rewards.mean(axis=1), color=color, alpha=0.25, linewidth=0.4)
+            if rewards.shape[1] > 1:
+                low, high = smooth.min(axis=1), smooth.max(axis=1)
+                axes.fill_between(episodes, low, high, color=color, alpha=0.2, linewidth=0)
+            axes.plot(
+                episodes, smooth.mean(axis=1), color=color, linewidth=1.3, label=LABELS[scheme]
+            )
+            if scheme in optima:
+                axes.axhline(optima[scheme], color=color, linewidth=0.9, linestyle=(0, (1, 1.5)))
+        axes.plot([], [], color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)), label="its optimum")
+        axes.set(xlabel="Episode", ylabel="Accumulated reward (bps/Hz)")
+        axes.set_xlim(left=0)
+        axes.grid(color="0.92", linewidth=0.5)
+        axes.legend(loc="lower right", frameon=True, framealpha=0.9, edgecolor="0.8")
+        return figure
+
+
+def flight_map(scenario: Scenario, flights: pd.DataFrame) -> Figure:
+    """The schemes' flights over the map (the paper's Fig. 3): relay solid, jamming dashed.
+
+    Args:
+        scenario: that was flown.
+        flights: a row per slot, as in :attr:`Evaluation.flights`; each scheme's first is drawn.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(COLUMN_WIDTH, 4.4), layout="constrained")
+        axes = figure.add_subplot()
+        draw_scenario(axes, scenario)
+        for scheme, color in COLORS.items():
+            slots = flights[(flights["scheme"] == scheme) & (flights["episode"] == 0)]
+            if len(slots):
+                path = np.vstack([scenario.helper_start, slots[["x", "y"]].to_numpy()])
+                draw_flight(axes, path, slots["relay"], color, LABELS[scheme])
+        handles, _ = axes.get_legend_handles_labels()
+        figure.legend(
+            handles=[*handles, *mode_handles()],
+            loc="outside lower center",
+            ncols=3,
+            frameon=False,
+            columnspacing=1.2,
+        )
+        return figure
+
+
+def sum_rate_maps(scenario: Scenario, resolution: float = 1.0) -> Figure:
+    """The secrecy sum-rate without fading at every helper position, in each mode and the better.
+
+    Args:
+        scenario: whose map is drawn.
+        resolution: of the map in m.
+    """
+    half = scenario.map_side / 2
+    axis = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64)
+    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
+    positions = torch.cartesian_prod(axis, axis).reshape(len(axis), len(axis), 2)
+    relay, jamming = (rates.T.numpy() for rates in system.sum_rates(positions))
+    better = np.maximum(relay, jamming)
+    panels = {"Relay": relay, "Jamming": jamming, "Better mode": better}
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(PAGE_WIDTH, 2.55), layout="constrained")
+        row: list[Axes] = list(figure.subplots(1, 3, sharey=True))
+        for axes, (title, rates) in zip(row, panels.items(), strict=True):
+            draw_scenario(axes, scenario)
+            image = axes.imshow(
+                rates,
+                origin="lower",
+                extent=(-half, half, -half, half),
+                cmap="viridis",
+                vmin=0.0,
+                vmax=better.max(),
+            )
+            axes.set_title(title, fontsize=8)
+            axes.label_outer()
+        chosen = np.where(better > 0, relay > jamming, np.nan)
+        row[2].contour(axis, axis, chosen, levels=[0.5], colors="white", linewidths=0.8)
+        figure.colorbar(image, ax=row, label="Secrecy sum-rate (bps/Hz)", pad=0.01)
+        return figure

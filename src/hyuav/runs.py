@@ -1,0 +1,186 @@
+"""The run directory: configuration, metrics, checkpoints, evaluation and figures of a training."""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from torch import Tensor
+from yaml import YAMLError
+
+from hyuav.errors import InputError, rejection, require_choice
+from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
+from hyuav.learning.checkpoint import load_checkpoint
+from hyuav.learning.training import TrainingParameters
+from hyuav.scenario import PRESETS, Scenario
+
+METRIC_COLUMNS = (
+    "episode",
+    "slots",
+    "learner",
+    "scheme",
+    "accumulated_reward",
+    "evaluation",
+    "best_evaluation",
+    "seconds",
+)
+"""Columns of ``metrics.csv``; the mean loss of each gradient step follows."""
+
+
+@dataclass(frozen=True)
+class RunConfiguration:
+    """What a training was asked to do: enough to build it again."""
+
+    scenario_name: str
+    scenario: Scenario
+    schemes: tuple[str, ...]
+    algorithm_name: str
+    algorithm: AlgorithmParameters
+    training: TrainingParameters
+    seed: int
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "RunConfiguration":
+        """Read what :meth:`to_dict` gives.
+
+        Raises:
+            InputError: a missing or unacceptable entry.
+        """
+        for name in ("scenario", "schemes", "algorithm", "training", "seed"):
+            if name not in values:
+                raise InputError(f"configuration: {name} is missing")
+        scenario_name, scenario = named_scenario(values["scenario"])
+        algorithm_name, algorithm = named_algorithm(values["algorithm"])
+        return cls(
+            scenario_name,
+            scenario,
+            tuple(values["schemes"]),
+            algorithm_name,
+            algorithm,
+            TrainingParameters.from_dict(values["training"]),
+            int(values["seed"]),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as they stand in ``config.yaml``."""
+        return {
+            "scenario": {"name": self.scenario_name, **self.scenario.to_dict()},
+            "schemes": list(self.schemes),
+            "algorithm": {"name": self.algorithm_name, **self.algorithm.to_dict()},
+            "training": self.training.to_dict(),
+            "seed": self.seed,
+        }
+
+
+def named_scenario(values: Mapping[str, Any] | str) -> tuple[str, Scenario]:
+    """A scenario and its name, from a preset's name or from the fields with a ``name``."""
+    if isinstance(values, str):
+        return values, Scenario.preset(values)
+    fields = {**values}
+    name = str(fields.pop("name", "custom"))
+    if "ue_positions" not in fields and name in PRESETS:
+        fields["ue_positions"] = PRESETS[name]
+    return name, Scenario.from_dict(fields)
+
+
+def named_algorithm(values: Mapping[str, Any]) -> tuple[str, AlgorithmParameters]:
+    """An algorithm and its name, from its hyperparameters with a ``name``."""
+    fields = {**values}
+    name = fields.pop("name", None)
+    require_choice("algorithm", name, ALGORITHMS)
+    return str(name), ALGORITHMS[str(name)].from_dict(fields)
+
+
+class RunDirectory:
+    """The files of one training.
+
+    ``config.yaml``, ``metrics.csv`` (a row per episode and learner), ``checkpoints/last.pt`` (all
+    that evolves), ``checkpoints/best.pt`` (the best weights so far), ``evaluation.json``,
+    ``flights.parquet`` and ``figures/``.
+
+    Args:
+        path: of the directory.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.config_file = self.path / "config.yaml"
+        self.metrics_file = self.path / "metrics.csv"
+        self.last_checkpoint = self.path / "checkpoints" / "last.pt"
+        self.best_checkpoint = self.path / "checkpoints" / "best.pt"
+        self.figures = self.path / "figures"
+
+    @classmethod
+    def create(cls, path: str | Path, configuration: RunConfiguration) -> "RunDirectory":
+        """Begin a run directory.
+
+        Raises:
+            InputError: another training's files are there, or the place cannot be written to.
+        """
+        run = cls(path)
+        if run.config_file.exists():
+            raise InputError(rejection("run directory", str(path), "one without a run in it"))
+        try:
+            run.figures.mkdir(parents=True, exist_ok=True)
+            OmegaConf.save(OmegaConf.create(configuration.to_dict()), run.config_file)
+        except OSError as error:
+            raise InputError(
+                rejection("run directory", str(path), f"a writable place ({error.strerror})")
+            ) from None
+        return run
+
+    def configuration(self) -> RunConfiguration:
+        """What the training was asked to do.
+
+        Raises:
+            InputError: there is no run here, or its ``config.yaml`` is not one.
+        """
+        try:
+            values = OmegaConf.to_container(OmegaConf.load(self.config_file), resolve=False)
+        except (OSError, YAMLError, OmegaConfBaseException, UnicodeDecodeError) as error:
+            reason = " ".join(str(error).split())
+            accepted = f"a run directory with a config.yaml ({reason})"
+            raise InputError(rejection("run", str(self.path), accepted)) from None
+        if not isinstance(values, dict):
+            raise InputError(rejection("run", str(self.path), "a run directory with a config.yaml"))
+        return RunConfiguration.from_dict({str(name): value for name, value in values.items()})
+
+    def best_weights(self) -> dict[str, Tensor]:
+        """The best weights so far of all learners.
+
+        Raises:
+            InputError: there is no such checkpoint, or it is truncated or foreign.
+        """
+        weights: dict[str, Tensor] = load_checkpoint(self.best_checkpoint, "weights")
+        return weights
+
+    def metrics(self) -> pd.DataFrame:
+        """What training brought, a row per episode and learner."""
+        return pd.read_csv(self.metrics_file)
+
+
+class MetricsFile:
+    """``metrics.csv``, to which rows are appended as training goes on.
+
+    Args:
+        path: of the file, which is begun anew.
+        columns: in their order.
+    """
+
+    def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
+        self._file = path.open("w", newline="", encoding="utf-8")
+        self._writer = csv.DictWriter(self._file, columns, restval="")
+        self._writer.writeheader()
+
+    def append(self, rows: list[dict[str, Any]]) -> None:
+        """Add rows; they can be read at once."""
+        self._writer.writerows(rows)
+        self._file.flush()
+
+    def close(self) -> None:
+        """No more rows follow."""
+        self._file.close()
