@@ -1,0 +1,254 @@
+"""Maps of a scenario and of the flights over it, drawn with matplotlib."""
+
+from collections import deque
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import torch
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike, NDArray
+
+from hyuav.errors import InputError, rejection
+from hyuav.model.channel import horizontal_distance
+from hyuav.model.offloading import covered_by_legitimate, covered_by_relay
+from hyuav.scenario import Point, Scenario
+
+OKABE_ITO = {
+    "black": "#000000",
+    "orange": "#E69F00",
+    "sky blue": "#56B4E9",
+    "bluish green": "#009E73",
+    "yellow": "#F0E442",
+    "blue": "#0072B2",
+    "vermillion": "#D55E00",
+    "reddish purple": "#CC79A7",
+}
+"""Okabe and Ito's palette, which the colour-blind can tell apart."""
+
+LEGITIMATE_COLOR = OKABE_ITO["blue"]
+EAVESDROPPER_COLOR = OKABE_ITO["vermillion"]
+HELPER_COLOR = OKABE_ITO["bluish green"]
+UE_COLOR = OKABE_ITO["black"]
+
+_FRAME_INCHES, _FRAME_DPI = (7.6, 5.2), 100  # even numbers of pixels, as video encoders want
+_FRAME_MAP, _FRAME_LEGEND = (0.13, 0.11, 0.55, 0.55 * 7.6 / 5.2), (0.69, 0.935)
+
+
+def draw_scenario(axes: Axes, scenario: Scenario, covered: ArrayLike | None = None) -> None:
+    """Draw the map: the UEs, the legitimate UAV with its coverage, the eavesdropper.
+
+    The axes are in metres, of equal scale, and end where the map ends. The nodes carry labels
+    for a legend.
+
+    Args:
+        axes: to draw on.
+        scenario: what to draw.
+        covered: (U,) bool, the UEs drawn filled, the others being hollow; None fills all.
+
+    Raises:
+        InputError: ``covered`` has another shape than (U,).
+    """
+    half = scenario.map_side / 2
+    axes.set(xlim=(-half, half), ylim=(-half, half), xlabel="x (m)", ylabel="y (m)")
+    axes.set_aspect("equal")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    axes.set_axisbelow(True)
+    axes.grid(color="0.92", linewidth=0.8)
+    draw_coverage(axes, scenario.legitimate_position, scenario.coverage_radius, LEGITIMATE_COLOR)
+    _draw_uav(axes, scenario.legitimate_position, "legitimate UAV (L)", _LEGITIMATE)
+    _draw_uav(axes, scenario.eavesdropper_position, "eavesdropper (E)", _EAVESDROPPER)
+    if covered is None:
+        _draw_ues(axes, np.asarray(scenario.ue_positions), UE_COLOR, "UE")
+        return
+    chosen = np.asarray(covered)
+    if chosen.shape != (scenario.num_ues,):
+        raise InputError(rejection("covered", chosen.shape, f"shape {(scenario.num_ues,)}"))
+    chosen = chosen.astype(bool)
+    _draw_ues(axes, np.asarray(scenario.ue_positions)[chosen], UE_COLOR, "UE, covered")
+    _draw_ues(axes, np.asarray(scenario.ue_positions)[~chosen], "white", "UE, not covered")
+
+
+def draw_coverage(axes: Axes, center: Point, radius: float, color: str) -> None:
+    """Draw the disk of ``radius`` m around ``center``, cut off where the map ends."""
+    disk = Circle(center, radius, facecolor=(color, 0.08), edgecolor=(color, 0.7), zorder=1)
+    axes.add_patch(disk)
+
+
+def draw_flight(
+    axes: Axes, positions: ArrayLike, modes: ArrayLike, color: str, label: str | None = None
+) -> None:
+    """Draw one flight: solid with full dots in relay slots, dashed with hollow dots in jamming.
+
+    A dot marks where each slot was spent, a diamond the start and a star the end.
+
+    Args:
+        axes: to draw on.
+        positions: (T + 1, 2) m, the start and then the position in each slot.
+        modes: (T,) of each slot, 1 relay and 0 jamming.
+        color: of the flight.
+        label: of the flight in a legend.
+
+    Raises:
+        InputError: the shapes do not belong together.
+    """
+    path, relays = np.asarray(positions, dtype=float), np.asarray(modes).astype(bool)
+    if path.ndim != 2 or path.shape[1] != 2 or len(path) == 0:
+        raise InputError(rejection("positions", path.shape, "shape (T + 1, 2)"))
+    if relays.shape != (len(path) - 1,):
+        raise InputError(rejection("modes", relays.shape, f"shape {(len(path) - 1,)}"))
+    for relay, first, last in _runs_of_one_mode(relays):
+        axes.plot(*path[first : last + 1].T, **_slot_style(color, relay=relay) | {"marker": ""})
+        axes.plot(*path[first + 1 : last + 1].T, **_slot_style(color, relay=relay) | _DOTS_ONLY)
+    ends = _DOTS_ONLY | {"color": color, "markeredgecolor": "white"}
+    axes.plot(*path[0], **ends | {"marker": "D", "markersize": 8})
+    if len(path) > 1:
+        axes.plot(*path[-1], **ends | {"marker": "*", "markersize": 12})
+    if label is not None:
+        axes.plot([], [], color=color, linewidth=2.0, label=label)
+
+
+def mode_handles(color: str = "0.3") -> list[Line2D]:
+    """The legend's samples of how :func:`draw_flight` shows the modes: relay, then jamming."""
+    return [
+        Line2D([], [], **_slot_style(color, relay=True), label="helper relays"),
+        Line2D([], [], **_slot_style(color, relay=False), label="helper jams"),
+    ]
+
+
+def render_frame(scenario: Scenario, positions: ArrayLike, modes: ArrayLike) -> NDArray[np.uint8]:
+    """Draw a flight up to now, with the coverage of this slot, as a picture.
+
+    Args:
+        scenario: that is flown.
+        positions: (t + 1, 2) m, the start and then the position in each slot up to now.
+        modes: (t + 1,) 1 relay, 0 jamming, at the start and of each slot.
+
+    Returns:
+        (height, width, 3) red, green and blue.
+    """
+    path, relays = np.asarray(positions, dtype=float), np.asarray(modes).astype(bool)
+    helper, slot = (float(path[-1, 0]), float(path[-1, 1])), len(path) - 1
+    figure = Figure(figsize=_FRAME_INCHES, dpi=_FRAME_DPI)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes(_FRAME_MAP)  # fixed, so that the map keeps still from frame to frame
+    draw_scenario(axes, scenario, _covered(scenario, helper, relay=bool(relays[-1])))
+    draw_coverage(axes, helper, scenario.coverage_radius, HELPER_COLOR)
+    draw_flight(axes, path, relays[1:], HELPER_COLOR)
+    _draw_uav(axes, helper, "helper UAV (H)", _HELPER)
+    axes.set_title(f"slot {slot} of {scenario.num_slots}, {'relay' if relays[-1] else 'jamming'}")
+    nodes, _ = axes.get_legend_handles_labels()
+    figure.legend(
+        handles=[*nodes, *mode_handles(HELPER_COLOR)],
+        loc="upper left",
+        bbox_to_anchor=_FRAME_LEGEND,
+        frameon=False,
+        labelspacing=1.0,
+    )
+    pixels, (width, height) = canvas.print_to_buffer()  # type: ignore[no-untyped-call]
+    return np.frombuffer(pixels, np.uint8).reshape(height, width, 4)[..., :3].copy()
+
+
+class FlightRecorder:
+    """The latest slots of a batch of flights, as far back as an episode can reach.
+
+    Args:
+        scenario: that is flown.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self._slots: deque[tuple[NDArray[Any], NDArray[Any]]] = deque(maxlen=scenario.num_slots + 1)
+
+    def add(self, position: NDArray[Any], mode: NDArray[Any]) -> None:
+        """Add one slot, or a start: ``position`` (*B, 2) m and ``mode`` (*B,)."""
+        self._slots.append((position.copy(), mode.copy()))
+
+    def drop_last(self) -> None:
+        """Take the last slot back, to :meth:`add` it again with some rows started anew."""
+        self._slots.pop()
+
+    def frame(self, slots_flown: int, row: tuple[int, ...]) -> NDArray[np.uint8]:
+        """What :func:`render_frame` draws of one row's flight, which is ``slots_flown`` long."""
+        slots = list(self._slots)[-1 - slots_flown :]
+        path, modes = ([entry[row] for entry in entries] for entries in zip(*slots, strict=True))
+        return render_frame(self.scenario, path, modes)
+
+
+def _covered(scenario: Scenario, helper: Point, *, relay: bool) -> NDArray[np.bool_]:
+    """Eq. 5 with the helper at ``helper``: (U,)."""
+    ues, radius = torch.tensor(scenario.ue_positions), scenario.coverage_radius
+    to_legitimate = horizontal_distance(ues, torch.tensor(scenario.legitimate_position))
+    if not relay:
+        return covered_by_legitimate(to_legitimate, radius).numpy()
+    to_helper = horizontal_distance(ues, torch.tensor(helper))
+    return covered_by_relay(to_helper, to_legitimate, radius).numpy()
+
+
+def _draw_ues(axes: Axes, positions: NDArray[np.float64], face: str, label: str) -> None:
+    axes.plot(
+        *positions.T,
+        linestyle="",
+        marker="o",
+        markersize=5.5,
+        markerfacecolor=face,
+        markeredgecolor=UE_COLOR,
+        label=label,
+        clip_on=False,
+        zorder=4,
+    )
+
+
+def _draw_uav(axes: Axes, position: Point, label: str, style: dict[str, Any]) -> None:
+    axes.plot(*position, linestyle="", label=label, clip_on=False, **style)
+
+
+_LEGITIMATE: dict[str, Any] = {
+    "color": LEGITIMATE_COLOR,
+    "marker": "s",
+    "markersize": 11,
+    "zorder": 2,
+}
+_EAVESDROPPER: dict[str, Any] = {
+    "color": EAVESDROPPER_COLOR,
+    "marker": "v",
+    "markersize": 14,
+    "zorder": 2,
+}
+# A ring, so that what the helper hovers over stays visible.
+_HELPER: dict[str, Any] = {
+    "color": HELPER_COLOR,
+    "marker": "o",
+    "markersize": 19,
+    "markerfacecolor": "none",
+    "markeredgewidth": 2.0,
+    "zorder": 4.5,
+}
+_DOTS_ONLY: dict[str, Any] = {"linestyle": "", "clip_on": False, "zorder": 3}
+
+
+def _slot_style(color: str, *, relay: bool) -> dict[str, Any]:
+    return {
+        "color": color,
+        "linestyle": "-" if relay else (0, (4, 2)),
+        "linewidth": 1.6,
+        "marker": "o",
+        "markersize": 4.5,
+        "markerfacecolor": color if relay else "white",
+        "zorder": 2.5,
+    }
+
+
+def _runs_of_one_mode(relays: NDArray[np.bool_]) -> Iterator[tuple[bool, int, int]]:
+    """Mode, first slot and end of each longest run, so that dashes go on over the slots."""
+    changes = np.flatnonzero(relays[1:] != relays[:-1]) + 1
+    bounds = [0, *changes.tolist(), len(relays)] if len(relays) else []
+    for first, last in pairwise(bounds):
+        yield bool(relays[first]), first, last
