@@ -1,0 +1,1 @@
+"""The exact optimum and the fixed flights that learned policies are compared with."""
