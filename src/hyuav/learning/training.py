@@ -12,6 +12,7 @@ from torchrl.collectors import Collector
 from hyuav.envs.transforms import make_env
 from hyuav.errors import InputError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
+from hyuav.learning.randomness import RandomStream
 from hyuav.learning.replay import as_transition, make_replay
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
 from hyuav.parameters import Parameters, count, parameter, switch
@@ -56,8 +57,8 @@ class Training:
     """N independent learners in one process, each with its own weights, replay and noise.
 
     The learners differ in their random numbers and, where ``schemes`` says so, in their scheme.
-    All that evolves is in :meth:`state_dict`. The random numbers of networks, noise and replay
-    are PyTorch's global ones, seeded here; those of fading and tasks are the environment's own.
+    All that evolves is in :meth:`state_dict`. The random numbers are the training's own, so that
+    it gives the same numbers whatever else the process does.
 
     Args:
         scenario: node positions and parameters.
@@ -77,7 +78,6 @@ class Training:
         seed: int = 0,
         device: torch.device | str | None = None,
     ) -> None:
-        torch.manual_seed(seed)
         learners, clock = len(schemes), parameters.clock
         self.scenario, self.schemes, self.parameters = scenario, tuple(schemes), parameters
         env = make_env(scenario, schemes, (learners,), device, seed, clock=clock)
@@ -86,7 +86,8 @@ class Training:
             scenario, schemes, (learners, parameters.evaluation_episodes), device, clock=clock
         )
         observation_size = env.observation_spec["observation"].shape[-1]
-        with env.device:
+        self._random = RandomStream(seed, env.device)
+        with env.device, self._random.active():
             self.algorithm = algorithm.build(learners, observation_size)
         self.replay = make_replay(
             learners, parameters.replay_size, parameters.batch_size, env.device
@@ -100,6 +101,7 @@ class Training:
             track_traj_ids=False,
             auto_register_policy_transforms=False,
         )
+        self._transitions = iter(self.collector)
         self.slots = self.updates = 0
         self.best_evaluation = torch.full((learners,), -torch.inf, device=env.device)
         self.best_weights = copy_weights(self.algorithm.loss)
@@ -111,22 +113,25 @@ class Training:
 
     def episodes(self) -> Iterator[Episode]:
         """Train until ``num_episodes`` are flown; report each episode as it ends."""
-        rewards: list[Tensor] = []
-        losses: list[dict[str, Tensor]] = []
         while self.episode < self.parameters.num_episodes:
-            transition = next(self.collector.iterator())[:, 0]
-            self.slots += 1
+            with self._random.active():
+                episode = self._train_episode()
+            yield episode
+
+    def _train_episode(self) -> Episode:
+        rewards, losses = [], []
+        for _ in range(self.scenario.num_slots):
+            transition = next(self._transitions)[:, 0]
             rewards.append(transition["next", "reward"].squeeze(-1))
             losses.append(self._learn(as_transition(transition)))
-            if self.slots % self.scenario.num_slots == 0:
-                yield Episode(
-                    number=self.episode,
-                    slots=self.slots,
-                    accumulated_reward=torch.stack(rewards).sum(dim=0),
-                    losses=_mean(losses),
-                    evaluation=self._evaluate() if self._evaluation_is_due() else None,
-                )
-                rewards, losses = [], []
+            self.slots += 1
+        return Episode(
+            number=self.episode,
+            slots=self.slots,
+            accumulated_reward=torch.stack(rewards).sum(dim=0),
+            losses=_mean(losses),
+            evaluation=self._evaluate() if self._evaluation_is_due() else None,
+        )
 
     def _learn(self, transition: TensorDictBase) -> dict[str, Tensor]:
         """Lines 12 to 15 of Algorithm 1; the collector has gone through lines 3 to 11."""
@@ -178,7 +183,7 @@ class Training:
             "replay": self.replay.state_dict(),
             "slot": self.collector._carrier.to_dict(),  # where the flight stands
             "environment": self.collector.env.base_env.random_state(),
-            "random": torch.get_rng_state(),
+            "random": self._random.state,
             "slots": self.slots,
             "updates": self.updates,
             "best_evaluation": self.best_evaluation,
@@ -198,7 +203,7 @@ class Training:
             self.replay.load_state_dict(state["replay"])
             self.collector._carrier.update(state["slot"])
             self.collector.env.base_env.set_random_state(state["environment"])
-            torch.set_rng_state(state["random"])
+            self._random.state = state["random"]
             self.slots, self.updates = state["slots"], state["updates"]
             self.best_evaluation = state["best_evaluation"]
             self.best_weights = state["best_weights"]

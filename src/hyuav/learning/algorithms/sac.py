@@ -8,6 +8,7 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import NormalParamExtractor, TensorDictModule, TensorDictSequential
 from torch import Tensor, nn
+from torchrl.envs.utils import ExplorationType
 from torchrl.modules import ProbabilisticActor, TanhNormal
 from torchrl.objectives import SACLoss, SoftUpdate, ValueEstimators
 
@@ -71,6 +72,7 @@ class SAC(AlgorithmParameters):
             distribution_class=TanhNormal,
             distribution_kwargs={"tanh_loc": False},
             return_log_prob=True,
+            default_interaction_type=ExplorationType.RANDOM,
         )
         loss = LearnerSACLoss(
             explorer,

@@ -1,0 +1,22 @@
+"""Random mini-batches, for tests of the algorithms."""
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+
+
+def mini_batch(learners: int, size: int, observation_size: int = 15) -> TensorDictBase:
+    """Transitions (learners, size) with the entries that the losses read."""
+    shape = (learners, size)
+    flag = torch.zeros(*shape, 1, dtype=torch.bool)
+    return TensorDict(
+        observation=torch.randn(*shape, observation_size),
+        action=torch.rand(*shape, 2) * 2 - 1,
+        next=TensorDict(
+            observation=torch.randn(*shape, observation_size),
+            reward=torch.randn(*shape, 1),
+            done=flag,
+            terminated=flag,
+            batch_size=shape,
+        ),
+        batch_size=shape,
+    )

@@ -1,0 +1,98 @@
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from hyuav.errors import InputError
+from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
+
+
+def test_a_checkpoint_holds_tensors_and_plain_values(tmp_path: Path) -> None:
+    content: dict[str, Any] = {
+        "weights": torch.randn(3, 2),
+        "slots": 7,
+        "nested": {"list": [1.5, "a", True, None]},
+    }
+    save_checkpoint(tmp_path / "deep" / "last.pt", "training", content)
+    loaded = load_checkpoint(tmp_path / "deep" / "last.pt", "training")
+    assert torch.equal(loaded.pop("weights"), content.pop("weights"))
+    assert loaded == content
+
+
+def test_an_interrupted_write_leaves_the_last_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "last.pt"
+    save_checkpoint(file, "training", {"slots": 1})
+
+    def fill_the_disk(_: Any, path: Path) -> None:
+        path.write_bytes(b"half a checkpoint")
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(torch, "save", fill_the_disk)
+    with pytest.raises(OSError, match="No space"):
+        save_checkpoint(file, "training", {"slots": 2})
+    assert load_checkpoint(file, "training") == {"slots": 1}
+
+
+def refusal(path: Path, kind: str = "training") -> str:
+    with pytest.raises(InputError) as caught:
+        load_checkpoint(path, kind)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith("checkpoint = ")
+    assert "expected a checkpoint of kind" in line
+    return line
+
+
+def test_a_missing_checkpoint_is_named(tmp_path: Path) -> None:
+    assert "No such file" in refusal(tmp_path / "none.pt")
+
+
+def test_a_directory_is_not_a_checkpoint(tmp_path: Path) -> None:
+    refusal(tmp_path)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
+def test_a_truncated_checkpoint_is_refused(tmp_path: Path, share: float) -> None:
+    file = tmp_path / "last.pt"
+    save_checkpoint(file, "training", {"weights": torch.randn(100, 100)})
+    file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
+    refusal(file)
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x80\x04N.", bytes(range(256))])
+def test_another_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "foreign.pt"
+    file.write_bytes(content)
+    refusal(file)
+
+
+def test_another_programs_checkpoint_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "foreign.pt"
+    torch.save({"state_dict": {"weight": torch.zeros(3)}}, file)
+    assert "another program" in refusal(file)
+
+
+def test_a_checkpoint_of_another_kind_is_refused(tmp_path: Path) -> None:
+    save_checkpoint(tmp_path / "best.pt", "weights", {})
+    assert "'weights'" in refusal(tmp_path / "best.pt", "training")
+
+
+class _Command:
+    """Unpickling this runs a command."""
+
+    def __init__(self, marker: Path) -> None:
+        self.marker = marker
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os.mkdir, (str(self.marker),)
+
+
+def test_loading_runs_no_code_from_a_checkpoint(tmp_path: Path) -> None:
+    marker = tmp_path / "was-here"
+    torch.save(_Command(marker), tmp_path / "hostile.pt")
+    refusal(tmp_path / "hostile.pt")
+    assert not marker.exists()

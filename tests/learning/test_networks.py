@@ -1,0 +1,52 @@
+import math
+
+import pytest
+import torch
+from tensordict import TensorDict
+from torch import nn
+
+from hyuav.learning.networks import LearnerLinear, LearnerMLP, make_actor, make_critic
+
+
+def test_each_learner_has_a_layer_of_its_own() -> None:
+    stacked, inputs = LearnerLinear(3, 5, 4), torch.randn(3, 7, 5)
+    outputs = stacked(inputs)
+    for learner in range(3):
+        alone = nn.functional.linear(
+            inputs[learner], stacked.weight[learner].T, stacked.bias[learner, 0]
+        )
+        torch.testing.assert_close(outputs[learner], alone)
+
+
+def test_fresh_weights_have_the_distribution_of_a_linear_layer() -> None:
+    torch.manual_seed(0)
+    stacked, alone = LearnerLinear(50, 100, 40), nn.Linear(100, 40)
+    bound = 1 / math.sqrt(100)
+    assert stacked.weight.abs().max() <= bound
+    assert stacked.weight.std().item() == pytest.approx(bound / math.sqrt(3), rel=0.01)
+    assert alone.weight.std().item() == pytest.approx(bound / math.sqrt(3), rel=0.05)
+    assert not torch.equal(stacked.weight[0], stacked.weight[1])
+
+
+@pytest.mark.parametrize("batch", [(), (6,), (6, 4)])
+def test_networks_take_any_batch_behind_the_learner_axis(batch: tuple[int, ...]) -> None:
+    data = TensorDict(
+        observation=torch.randn(2, *batch, 15), action=torch.randn(2, *batch, 2), batch_size=[2]
+    )
+    actor, critic = make_actor(2, 15, (8, 4), "tanh"), make_critic(2, 15, (8, 4), "tanh")
+    assert critic(data.clone())["state_action_value"].shape == (2, *batch, 1)
+    assert actor(data.clone())["action"].shape == (2, *batch, 2)
+
+
+def test_an_actor_stays_within_the_action_box() -> None:
+    actor = make_actor(1, 3, (8,), "relu")
+    data = TensorDict(observation=1e4 * torch.randn(1, 100, 3), batch_size=[1])
+    assert actor(data)["action"].abs().max() <= 1.0
+
+
+def test_hidden_layers_have_the_sizes_of_the_paper_by_default() -> None:
+    network = LearnerMLP(1, 15, (300, 100, 100), 2, "tanh")
+    shapes = [
+        layer.weight.shape[1:] for layer in network.modules() if isinstance(layer, LearnerLinear)
+    ]
+    assert shapes == [(15, 300), (300, 100), (100, 100), (100, 2)]
