@@ -17,6 +17,7 @@ from hyuav.experiment import (
     learned_policies,
     print_results,
     reference_policies,
+    select_initial_weights,
     train,
 )
 from hyuav.learning.training import TrainingParameters
@@ -30,6 +31,8 @@ class Reproduce(Parameters):
     """How the main job is done."""
 
     seeds: int = parameter(count(), 1)
+    candidates: int = parameter(count(), 5)
+    candidate_episodes: int = parameter(count(), 50)
     seed: int = parameter(count(0), 0)
     device: str = parameter(text, "cpu")
     threads: int = parameter(count(), 2)
@@ -64,7 +67,27 @@ def main(config: Config, directory: Path) -> None:
         options.seed,
     )
     console = Console()
-    run = train(directory, configuration, logger, console, device=options.device)
+    initial_weights = None
+    if options.candidates > 1:
+        initial_weights, earned = select_initial_weights(
+            configuration,
+            options.candidates,
+            options.candidate_episodes,
+            device=options.device,
+        )
+        reached = ", ".join(f"{value:.1f}" for value in earned)
+        console.print(
+            f"initial weights from {options.candidates} candidates per scheme after "
+            f"{options.candidate_episodes} episodes: {reached} bps/Hz"
+        )
+    run = train(
+        directory,
+        configuration,
+        logger,
+        console,
+        device=options.device,
+        initial_weights=initial_weights,
+    )
     policies = {
         **learned_policies([run], scenario),
         **reference_policies(scenario, parameters.resolution, console),

@@ -10,7 +10,7 @@ import torch
 from rich.console import Console
 
 from hyuav.configuration import Config, recipe, section
-from hyuav.experiment import train
+from hyuav.experiment import saved_weights, train
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import Parameters, choice, count, optional, parameter, text
 from hyuav.runs import RunConfiguration, named_algorithm, named_scenario
@@ -59,7 +59,7 @@ def main(config: Config, directory: Path) -> None:
         LoggerParameters.from_dict(config["logger"]),
         console,
         device=options.device,
-        warm_start=options.warm_start,
+        initial_weights=None if options.warm_start is None else saved_weights(options.warm_start),
     )
     best = run.metrics()["best_evaluation"].dropna().tail(options.learners)
     returns = ", ".join(f"{value:.2f}" for value in best)

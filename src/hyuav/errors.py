@@ -27,7 +27,7 @@ def require_choice(name: str, value: object, choices: Iterable[str]) -> None:
         InputError: naming the choices, the most similar one first if there is one.
     """
     choices = list(choices)
-    if value in choices:
+    if isinstance(value, str) and value in choices:
         return
     similar = difflib.get_close_matches(str(value), choices, n=1)
     hint = f" (did you mean {similar[0]!r}?)" if similar else ""

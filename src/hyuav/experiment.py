@@ -1,5 +1,6 @@
 """What the recipes do: train into a run directory, gather the schemes, evaluate, draw."""
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
 from hyuav.figures import flight_map, learning_curves, save_figure, sum_rate_maps
 from hyuav.learning.checkpoint import load_checkpoint
 from hyuav.learning.training import Training
+from hyuav.learning.weights import join_learners, load_weights, select_learner
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
@@ -34,7 +36,7 @@ def train(
     console: Console,
     *,
     device: str | None = None,
-    warm_start: str | Path | None = None,
+    initial_weights: dict[str, Tensor] | None = None,
 ) -> RunDirectory:
     """Train as configured, reporting to a new run directory.
 
@@ -44,7 +46,7 @@ def train(
         logger: what Weights & Biases gets.
         console: to show progress on.
         device: to train on.
-        warm_start: a checkpoint, or a run directory whose best weights are meant, to begin with.
+        initial_weights: to begin with, instead of fresh ones.
 
     Raises:
         InputError: the directory is taken, or the checkpoint does not fit.
@@ -57,8 +59,8 @@ def train(
         configuration.seed,
         device,
     )
-    if warm_start is not None:
-        training.warm_start(_weights_from(Path(warm_start)))
+    if initial_weights is not None:
+        training.warm_start(initial_weights)
     run = RunDirectory.create(directory, configuration)
     with Tracker(run, configuration, training, logger, console) as tracker:
         for episode in training.episodes():
@@ -66,10 +68,58 @@ def train(
     return run
 
 
-def _weights_from(path: Path) -> dict[str, Tensor]:
+def saved_weights(path: str | Path) -> dict[str, Tensor]:
+    """The weights in a checkpoint, or the best weights of a run directory.
+
+    Raises:
+        InputError: there are none, or the file is truncated or foreign.
+    """
+    path = Path(path)
     file = RunDirectory(path).best_checkpoint if path.is_dir() else path
     weights: dict[str, Tensor] = load_checkpoint(file, "weights")
     return weights
+
+
+def select_initial_weights(
+    configuration: RunConfiguration,
+    candidates: int,
+    episodes: int,
+    *,
+    device: str | None = None,
+) -> tuple[dict[str, Tensor], list[float]]:
+    """Begin where a higher reward was reached: the best flyer of a few short trainings.
+
+    The paper sets its initial weights so. Every scheme trains its candidates, and every learner
+    begins with whichever candidate, of any scheme, earns most under the learner's own scheme.
+    They are judged without noise on fading of their own.
+
+    Args:
+        configuration: of the training to come; N is its number of learners.
+        candidates: short trainings for each of its schemes.
+        episodes: of each candidate.
+        device: to train on.
+
+    Returns:
+        the chosen candidates' weights, and what they earn (N,) in bps/Hz.
+    """
+    rules = tuple(dict.fromkeys(configuration.schemes))
+    training = Training(
+        configuration.scenario,
+        [rule for rule in rules for _ in range(candidates)],
+        configuration.algorithm,
+        dataclasses.replace(configuration.training, num_episodes=episodes),
+        configuration.seed,
+        device,
+    )
+    for _ in training.episodes():
+        pass
+    load_weights(training.algorithm.loss, training.best_weights)
+    chosen, earned = [], []
+    for rule in configuration.schemes:
+        evaluation = training.evaluate(rule)
+        chosen.append(select_learner(training.best_weights, int(evaluation.argmax())))
+        earned.append(float(evaluation.max()))
+    return join_learners(chosen), earned
 
 
 def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[str, list[Policy]]:

@@ -4,8 +4,12 @@ from collections.abc import Sequence
 
 import torch
 
-from hyuav.errors import InputError, rejection
+from hyuav.parameters import count, number, sequence
 from hyuav.scenario import Point
+
+_length = number(0.0)
+_point = sequence(number(), "two coordinates (x, y) in metres", length=2)
+_sizes = sequence(count(), "the numbers of UEs of one cluster or more")
 
 
 def disk(
@@ -23,9 +27,11 @@ def disk(
         U positions (x, y) in metres, for :attr:`Scenario.ue_positions`.
 
     Raises:
-        InputError: ``num_ues`` below 1 or ``radius`` below 0.
+        InputError: ``num_ues`` below 1, ``radius`` below 0, or a value of the wrong type.
     """
-    return _disk(num_ues, radius, center, torch.Generator().manual_seed(seed))
+    generator = torch.Generator().manual_seed(count(0)("seed", seed))
+    num_ues, radius = count()("num_ues", num_ues), _length("radius", radius)
+    return _disk(num_ues, radius, _point("center", center), generator)
 
 
 def clusters(
@@ -49,13 +55,12 @@ def clusters(
         sum(sizes) positions (x, y) in metres, cluster by cluster.
 
     Raises:
-        InputError: no cluster, an empty cluster, or a negative length.
+        InputError: no cluster, an empty cluster, a negative length, or a value of the wrong type.
     """
-    if not sizes:
-        raise InputError(rejection("sizes", sizes, "the size of at least one cluster"))
-    if spread < 0:
-        raise InputError(rejection("spread", spread, "a length >= 0 m"))
-    generator = torch.Generator().manual_seed(seed)
+    generator = torch.Generator().manual_seed(count(0)("seed", seed))
+    sizes, center = _sizes("sizes", sizes), _point("center", center)
+    cluster_radius = _length("cluster_radius", cluster_radius)
+    spread = _length("spread", spread)
     turn = torch.rand((), generator=generator, dtype=torch.float64)
     angles = 2 * torch.pi * (turn + torch.arange(len(sizes), dtype=torch.float64) / len(sizes))
     positions: list[Point] = []
@@ -69,10 +74,6 @@ def clusters(
 def _disk(
     num_ues: int, radius: float, center: Point, generator: torch.Generator
 ) -> tuple[Point, ...]:
-    if num_ues < 1:
-        raise InputError(rejection("num_ues", num_ues, "a whole number >= 1"))
-    if radius < 0:
-        raise InputError(rejection("radius", radius, "a length >= 0 m"))
     draws = torch.rand((num_ues, 2), generator=generator, dtype=torch.float64)
     distance, angle = radius * draws[:, 0].sqrt(), 2 * torch.pi * draws[:, 1]
     x, y = center[0] + distance * angle.cos(), center[1] + distance * angle.sin()

@@ -83,6 +83,34 @@ def choice(*choices: str) -> Converter:
     return convert
 
 
+def text(name: str, value: Any) -> str:
+    """Accept text that is not empty."""
+    if not isinstance(value, str):
+        raise InputTypeError(rejection(name, value, "text"))
+    if not value.strip():
+        raise InputError(rejection(name, value, "text that is not empty"))
+    return value
+
+
+def optional(convert: Converter) -> Converter:
+    """Accept None, and what ``convert`` accepts."""
+
+    def convert_or_none(name: str, value: Any) -> Any:
+        return None if value is None else convert(name, value)
+
+    return convert_or_none
+
+
+def one_or_more(element: Converter, accepted: str) -> Converter:
+    """Accept one value or a list of them; keep a tuple."""
+    several = sequence(element, accepted)
+
+    def convert(name: str, value: Any) -> tuple[Any, ...]:
+        return several(name, value if isinstance(value, list | tuple) else [value])
+
+    return convert
+
+
 def sequence(element: Converter, accepted: str, *, length: int | None = None) -> Converter:
     """Accept lists, tuples, arrays and tensors of at least one element; keep them as tuples."""
 
@@ -182,7 +210,7 @@ class Parameters:
         file = f"{cls.__name__.lower()} file {str(path)!r}"
         try:
             values = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
-        except (OSError, YAMLError, OmegaConfBaseException, UnicodeDecodeError) as error:
+        except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
             reason = " ".join(str(error).split())
             raise InputError(f"{file}: cannot be read ({reason})") from None
         if not isinstance(values, dict):

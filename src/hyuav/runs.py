@@ -12,11 +12,13 @@ from omegaconf.errors import OmegaConfBaseException
 from torch import Tensor
 from yaml import YAMLError
 
-from hyuav.errors import InputError, rejection, require_choice
+from hyuav.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
 from hyuav.learning.checkpoint import load_checkpoint
 from hyuav.learning.training import TrainingParameters
+from hyuav.parameters import choice, count, sequence
 from hyuav.scenario import PRESETS, Scenario
+from hyuav.system import SCHEMES
 
 METRIC_COLUMNS = (
     "episode",
@@ -58,11 +60,11 @@ class RunConfiguration:
         return cls(
             scenario_name,
             scenario,
-            tuple(values["schemes"]),
+            _schemes("schemes", values["schemes"]),
             algorithm_name,
             algorithm,
-            TrainingParameters.from_dict(values["training"]),
-            int(values["seed"]),
+            TrainingParameters.from_dict(mapping("training", values["training"])),
+            count(0)("seed", values["seed"]),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -76,20 +78,30 @@ class RunConfiguration:
         }
 
 
-def named_scenario(values: Mapping[str, Any] | str) -> tuple[str, Scenario]:
+_schemes = sequence(choice(*SCHEMES), f"a list of {', '.join(SCHEMES)}")
+
+
+def mapping(name: str, value: object) -> dict[str, Any]:
+    """Accept names with values."""
+    if not isinstance(value, Mapping):
+        raise InputTypeError(rejection(name, value, "names with values"))
+    return {str(key): entry for key, entry in value.items()}
+
+
+def named_scenario(values: object) -> tuple[str, Scenario]:
     """A scenario and its name, from a preset's name or from the fields with a ``name``."""
     if isinstance(values, str):
         return values, Scenario.preset(values)
-    fields = {**values}
+    fields = mapping("scenario", values)
     name = str(fields.pop("name", "custom"))
     if "ue_positions" not in fields and name in PRESETS:
         fields["ue_positions"] = PRESETS[name]
     return name, Scenario.from_dict(fields)
 
 
-def named_algorithm(values: Mapping[str, Any]) -> tuple[str, AlgorithmParameters]:
+def named_algorithm(values: object) -> tuple[str, AlgorithmParameters]:
     """An algorithm and its name, from its hyperparameters with a ``name``."""
-    fields = {**values}
+    fields = mapping("algorithm", values)
     name = fields.pop("name", None)
     require_choice("algorithm", name, ALGORITHMS)
     return str(name), ALGORITHMS[str(name)].from_dict(fields)

@@ -63,6 +63,10 @@ def as_seed(seed: int | None) -> int:
     accepted = "a whole number in [0, 2^63)"
     if isinstance(seed, bool) or not hasattr(seed, "__index__"):
         raise InputTypeError(rejection("seed", seed, accepted))
-    if not 0 <= (number := seed.__index__()) < 2**63:
+    try:
+        number = seed.__index__()
+    except TypeError:
+        raise InputTypeError(rejection("seed", seed, accepted)) from None
+    if not 0 <= number < 2**63:
         raise InputError(rejection("seed", seed, accepted))
     return number

@@ -90,7 +90,7 @@ def diagnose(
     flying = energy.flight_energy(flown.velocity, scenario.helper_mass, duration).unsqueeze(-1)
     helper_energy = flying + transmitting
     violations = (
-        (ue_energy > scenario.ue_energy_budget).sum(dim=-1, keepdim=True)
+        (ue_energy > _rounded_up(scenario.ue_energy_budget)).sum(dim=-1, keepdim=True)
         + (edge_energy > _rounded_up(scenario.edge_energy_budget))
         + (helper_energy > _rounded_up(scenario.helper_energy_budget))
     )

@@ -192,8 +192,9 @@ class SecureOffloadingEnv(EnvBase):
             tasks = self.system.draw_tasks(self.batch_size, self._task_rng)
         distances = self.system.distances(position)
         gains = self.system.channel_gains(distances, fading)
-        relay = self.system.relay_outcome(distances, gains, tasks)
-        jamming = self.system.jamming_outcome(gains, tasks)
+        admission = tasks if self.system.edge_can_saturate else None
+        relay = self.system.relay_outcome(distances, gains, admission)
+        jamming = self.system.jamming_outcome(gains, admission)
         relay_mode = prefers_relay(relay.sum_rate, jamming.sum_rate).unsqueeze(-1)
         relay_mode = (relay_mode | self._always_relay) & ~self._always_jam
         return Slot(position, distances, relay_mode, relay, jamming, tasks)

@@ -82,9 +82,6 @@ class Training:
         self.scenario, self.schemes, self.parameters = scenario, tuple(schemes), parameters
         env = make_env(scenario, schemes, (learners,), device, seed, clock=clock)
         self._evaluation_seed = seed + 1
-        self._evaluation_env = make_env(
-            scenario, schemes, (learners, parameters.evaluation_episodes), device, clock=clock
-        )
         observation_size = env.observation_spec["observation"].shape[-1]
         self._random = RandomStream(seed, env.device)
         with env.device, self._random.active():
@@ -130,7 +127,7 @@ class Training:
             slots=self.slots,
             accumulated_reward=torch.stack(rewards).sum(dim=0),
             losses=_mean(losses),
-            evaluation=self._evaluate() if self._evaluation_is_due() else None,
+            evaluation=self._keep_best() if self._evaluation_is_due() else None,
         )
 
     def _learn(self, transition: TensorDictBase) -> dict[str, Tensor]:
@@ -148,19 +145,38 @@ class Training:
         last = self.episode == self.parameters.num_episodes
         return last or self.episode % self.parameters.evaluation_every == 0
 
-    @torch.no_grad()
-    def _evaluate(self) -> Tensor:
-        """Fly without noise on the same fading draws every time; keep the best weights so far."""
-        self._evaluation_env.set_seed(self._evaluation_seed)
-        flown = self._evaluation_env.rollout(self.scenario.num_slots, self.algorithm.actor)
+    def evaluate(self, scheme: str | None = None) -> Tensor:
+        """Fly the current actors without noise, on the same fading draws every time.
+
+        Args:
+            scheme: that all learners fly; None for each learner's own.
+
+        Returns:
+            (N,) mean accumulated reward in bps/Hz.
+        """
+        env = make_env(
+            self.scenario,
+            self.schemes if scheme is None else scheme,
+            (len(self.schemes), self.parameters.evaluation_episodes),
+            self.collector.env.device,
+            self._evaluation_seed,
+            clock=self.parameters.clock,
+        )
+        with torch.no_grad():
+            flown = env.rollout(self.scenario.num_slots, self.algorithm.actor)
         evaluation: Tensor = flown["next", "episode_reward"][..., -1, 0].mean(dim=-1)
+        return evaluation
+
+    def _keep_best(self) -> Tensor:
+        """Evaluate; where a learner has never been better, its weights are the best so far."""
+        evaluation = self.evaluate()
         better = evaluation > self.best_evaluation
         self.best_evaluation = torch.where(better, evaluation, self.best_evaluation)
         replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
         return evaluation
 
     def warm_start(self, weights: dict[str, Tensor]) -> None:
-        """Begin with the networks of an earlier training instead of fresh ones.
+        """Begin with the networks of an earlier training, the best so far until beaten.
 
         Args:
             weights: of N learners, or of one, with which all then begin.
@@ -170,7 +186,7 @@ class Training:
                 of learners.
         """
         load_weights(self.algorithm.loss, weights)
-        self.best_weights = copy_weights(self.algorithm.loss)
+        self._keep_best()
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that evolves: continuing from it gives the numbers of an unbroken run.

@@ -4,6 +4,8 @@ Stacked weights have the learner axis third from the end (:class:`LearnerLinear`
 add one axis in front), and a learner's temperature has it in front of one more axis.
 """
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 from torchrl.objectives import LossModule
@@ -33,6 +35,14 @@ def select_learner(weights: dict[str, Tensor], learner: int) -> dict[str, Tensor
     """The weights of one learner, with a learner axis of length one."""
     return {
         name: values.narrow(_learner_axis(values), learner, 1) for name, values in weights.items()
+    }
+
+
+def join_learners(weights: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
+    """The weights of several sets of learners as those of one set, in their order."""
+    return {
+        name: torch.cat([each[name] for each in weights], dim=_learner_axis(values))
+        for name, values in weights[0].items()
     }
 
 

@@ -1,0 +1,39 @@
+import dataclasses
+
+import pytest
+import torch
+
+from hyuav import InputError, Scenario, make_env
+from hyuav.learning.algorithms import ALGORITHMS
+from hyuav.learning.weights import copy_weights
+from hyuav.schemes.learned import LearnedPolicy
+
+SCENARIO = Scenario.preset("two_clusters")
+
+
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+@pytest.mark.parametrize("batch_size", [(), (4,), (2, 3)])
+def test_a_saved_actor_flies_any_batch(name: str, batch_size: tuple[int, ...]) -> None:
+    algorithm = ALGORITHMS[name](hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(3, 15).loss)
+    policy = LearnedPolicy(SCENARIO, algorithm, weights, learner=2)
+    flown = make_env(SCENARIO, batch_size=batch_size).rollout(5, policy)
+    assert flown["action"].shape == (*batch_size, 5, 2)
+    assert not flown["action"].requires_grad
+
+
+def test_a_learner_acts_as_it_did_in_training() -> None:
+    algorithm = ALGORITHMS["ddpg"](hidden_sizes=(8,))
+    built = algorithm.build(3, 15)
+    policy = LearnedPolicy(SCENARIO, algorithm, copy_weights(built.loss), learner=1)
+    observed = make_env(SCENARIO, batch_size=3).reset()
+    expected = built.actor(observed.clone())["action"][1]
+    torch.testing.assert_close(policy(observed.clone())["action"][1], expected)
+
+
+def test_an_actor_of_other_ues_is_refused() -> None:
+    algorithm = ALGORITHMS["ddpg"](hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(1, 15).loss)
+    fewer = dataclasses.replace(SCENARIO, ue_positions=SCENARIO.ue_positions[:4])
+    with pytest.raises(InputError, match="checkpoint"):
+        LearnedPolicy(fewer, algorithm, weights)

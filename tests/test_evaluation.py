@@ -1,0 +1,126 @@
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from scipy import stats
+
+from hyuav import Scenario
+from hyuav.evaluation import (
+    LABELS,
+    MODE_RULES,
+    OPTIMA,
+    EvaluationParameters,
+    Policy,
+    confidence_interval,
+    evaluate,
+    fly,
+    secrecy_sum_rate,
+)
+from hyuav.learning.algorithms import DDPG
+from hyuav.learning.weights import copy_weights
+from hyuav.schemes.learned import LearnedPolicy
+from hyuav.schemes.linear import ja_lt, re_lt
+from hyuav.schemes.optimum import FlightPolicy, solve
+
+SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
+FEW = EvaluationParameters(episodes=40, flights=2, seed=5)
+
+
+@pytest.fixture(scope="module")
+def policies() -> dict[str, list[Policy]]:
+    algorithm = DDPG(hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(2, 15).loss)
+    optima = solve(SCENARIO, resolution=2.0)
+    return {
+        "re_lt": [Policy(re_lt(SCENARIO))],
+        "ja_lt": [Policy(ja_lt(SCENARIO))],
+        "proposed": [Policy(LearnedPolicy(SCENARIO, algorithm, weights, i)) for i in range(2)],
+        **{
+            OPTIMA[rule]: [Policy(FlightPolicy(optimum.path, SCENARIO))]
+            for rule, optimum in optima.items()
+        },
+    }
+
+
+def test_the_summary_has_the_promised_fields(policies: dict[str, list[Policy]]) -> None:
+    summary = evaluate(SCENARIO, "two_clusters", policies, FEW).summary
+    assert summary["scenario"] == "two_clusters"
+    assert (summary["num_slots"], summary["episodes"]) == (10, 40)
+    assert list(summary["schemes"]) == [scheme for scheme in LABELS if scheme in policies]
+    for result in summary["schemes"].values():
+        low, high = result["secrecy_sum_rate"]["ci95"]
+        assert low < result["secrecy_sum_rate"]["mean"] < high
+        assert {"relay_share", "offloading_share", "off_map", "budget_violations"} <= set(result)
+        assert {"ue_energy", "edge_energy", "helper_energy"} <= set(result)
+    assert summary["schemes"]["optimum"]["fraction_of_optimum"] == 1.0
+    assert json.loads(json.dumps(summary)) == summary
+
+
+def test_a_fixed_mode_scheme_is_measured_against_its_own_optimum_and_the_hybrid_one(
+    policies: dict[str, list[Policy]],
+) -> None:
+    schemes = evaluate(SCENARIO, "two_clusters", policies, FEW).summary["schemes"]
+    mean = {name: result["secrecy_sum_rate"]["mean"] for name, result in schemes.items()}
+    jamming = schemes["ja_lt"]
+    assert jamming["fraction_of_optimum"] == mean["ja_lt"] / mean["ja_optimum"]
+    assert jamming["fraction_of_hybrid_optimum"] == mean["ja_lt"] / mean["optimum"]
+
+
+def test_all_schemes_fly_through_the_same_fading() -> None:
+    everywhere = SCENARIO.helper_start
+    still = dataclasses.replace(SCENARIO, eavesdropper_position=everywhere)
+    hovering = Policy(ja_lt(still))
+    twice = [fly(still, scheme, hovering, 5, 3) for scheme in ("ja_lt", "optimum")]
+    for rates in ("relay_sum_rate", "jamming_sum_rate"):
+        first, second = (flown["diagnostics", rates] for flown in twice)
+        assert torch.equal(first, second)
+
+
+def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> None:
+    leaving = dataclasses.replace(SCENARIO, eavesdropper_position=(-100.0, -100.0))
+    policy = Policy(ja_lt(dataclasses.replace(leaving, num_slots=3)))
+    flown = fly(leaving, "ja_lt", policy, 4, 0)
+    assert flown["off_map"].any()
+    torch.testing.assert_close(
+        secrecy_sum_rate(flown), flown["diagnostics", "jamming_sum_rate"].squeeze(-1)
+    )
+
+
+def test_flights_are_kept_a_row_per_slot(policies: dict[str, list[Policy]], tmp_path: Path) -> None:
+    evaluation = evaluate(SCENARIO, "two_clusters", policies, FEW)
+    evaluation.save(tmp_path)
+    flights = pd.read_parquet(tmp_path / "flights.parquet")
+    assert len(flights) == len(policies) * 2 * 10
+    row = flights[(flights.scheme == "re_lt") & (flights.episode == 1) & (flights.slot == 10)]
+    assert len(row) == 1
+    assert row.relay.item()
+    assert len(row.offloading.item()) == SCENARIO.num_ues
+    assert row.secrecy_sum_rate.item() == pytest.approx(sum(row.secrecy_rate.item()), rel=1e-5)
+    assert json.loads((tmp_path / "evaluation.json").read_text())["episodes"] == 40
+
+
+def test_the_interval_of_one_learner_speaks_of_the_episodes() -> None:
+    returns = np.random.default_rng(0).normal(50, 3, (1, 200))
+    low, high = confidence_interval(returns)
+    half_width = stats.t.ppf(0.975, 199) * returns.std(ddof=1) / np.sqrt(200)
+    assert (low, high) == pytest.approx((returns.mean() - half_width, returns.mean() + half_width))
+
+
+def test_the_interval_of_several_learners_speaks_of_the_learners() -> None:
+    generator = np.random.default_rng(0)
+    returns = generator.normal(50, 5, (6, 1)) + generator.normal(0, 0.1, (6, 400))
+    low, high = confidence_interval(returns)
+    assert high - low > 4.0  # without the learners it would be 0.04
+
+
+def test_the_interval_of_a_flight_without_fading_is_its_value() -> None:
+    assert confidence_interval(np.full((1, 10), 7.0)) == [7.0, 7.0]
+
+
+def test_every_scheme_has_a_label_a_mode_rule_and_an_optimum() -> None:
+    assert set(LABELS) == set(MODE_RULES)
+    assert {OPTIMA[rule] for rule in MODE_RULES.values()} <= set(LABELS)

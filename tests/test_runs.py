@@ -1,0 +1,100 @@
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from hyuav import InputError, Scenario
+from hyuav.learning.algorithms import ALGORITHMS, SAC, TD3
+from hyuav.learning.training import TrainingParameters
+from hyuav.runs import (
+    MetricsFile,
+    RunConfiguration,
+    RunDirectory,
+    named_algorithm,
+    named_scenario,
+)
+
+CONFIGURATION = RunConfiguration(
+    "custom",
+    dataclasses.replace(Scenario.preset("two_clusters"), num_slots=7, noise_power=2.5e-13),
+    ("hybrid", "jamming"),
+    "td3",
+    TD3(hidden_sizes=(5,), actor_every=3),
+    TrainingParameters(num_episodes=2),
+    11,
+)
+
+
+def test_a_run_remembers_its_configuration_without_loss(tmp_path: Path) -> None:
+    run = RunDirectory.create(tmp_path / "run", CONFIGURATION)
+    assert run.configuration() == CONFIGURATION
+
+
+def test_a_run_never_overwrites_another(tmp_path: Path) -> None:
+    RunDirectory.create(tmp_path, CONFIGURATION)
+    with pytest.raises(InputError, match=r"run directory = .*: expected one without a run in it"):
+        RunDirectory.create(tmp_path, CONFIGURATION)
+
+
+def test_a_run_in_the_place_of_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="expected a writable place"):
+        RunDirectory.create(tmp_path / "file", CONFIGURATION)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [None, "", "- 1", "seed: 3", "a: [", "scenario: {name: x}\nschemes: [hybrid]", "\x00\xff"],
+)
+def test_a_directory_that_is_no_run_is_refused_in_one_line(
+    tmp_path: Path, content: str | None
+) -> None:
+    if content is not None:
+        (tmp_path / "config.yaml").write_text(content, encoding="latin-1")
+    with pytest.raises(InputError, match=r"^[^\n]+$"):
+        RunDirectory(tmp_path).configuration()
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [
+        ("schemes", ["hybrid", "both"]),
+        ("schemes", "hybrid"),
+        ("schemes", []),
+        ("seed", "many"),
+        ("seed", -1),
+        ("algorithm", {"name": "ppo"}),
+        ("algorithm", "ddpg"),
+        ("algorithm", {"name": "ddpg", "discount": 2}),
+        ("training", 3),
+        ("training", {"num_episodes": 0}),
+        ("scenario", 4),
+        ("scenario", "nowhere"),
+        ("scenario", {"name": "custom"}),
+    ],
+)
+def test_a_bad_entry_of_a_configuration_is_named(entry: str, value: object) -> None:
+    with pytest.raises(InputError, match=rf"^[^\n]*{entry.rstrip('s')}|^[^\n]*(discount|num_ep)"):
+        RunConfiguration.from_dict({**CONFIGURATION.to_dict(), entry: value})
+
+
+def test_a_scenario_may_name_a_preset_and_change_it() -> None:
+    name, scenario = named_scenario({"name": "random_disk", "num_slots": 5})
+    assert name == "random_disk"
+    assert scenario == dataclasses.replace(Scenario.preset("random_disk"), num_slots=5)
+
+
+def test_an_algorithm_is_chosen_by_name() -> None:
+    assert named_algorithm({"name": "sac", "discount": 0.9}) == ("sac", SAC(discount=0.9))
+    for name, algorithm in ALGORITHMS.items():
+        assert named_algorithm({"name": name}) == (name, algorithm())
+
+
+def test_metrics_can_be_read_while_they_are_written(tmp_path: Path) -> None:
+    run = RunDirectory(tmp_path)
+    file = MetricsFile(run.metrics_file, ("episode", "evaluation"))
+    file.append([{"episode": 1}, {"episode": 2, "evaluation": 3.5}])
+    table = run.metrics()
+    assert table["episode"].tolist() == [1, 2]
+    assert table["evaluation"].isna().tolist() == [True, False]
+    file.close()
