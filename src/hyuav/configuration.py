@@ -84,14 +84,17 @@ def recipe(
             values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
             assert isinstance(values, dict)
             directory = Path(HydraConfig.get().runtime.output_dir)
-            function({str(key): value for key, value in values.items()}, directory)
+            try:
+                function({str(key): value for key, value in values.items()}, directory)
+            except InputError as error:
+                _refuse(str(error))  # here, before Hydra adds lines of its own
 
         def command() -> None:
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the line below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
             try:
                 hydra.main(version_base=None, config_path=None, config_name=name)(run)()
-            except (InputError, HydraException, OmegaConfBaseException) as error:
+            except (HydraException, OmegaConfBaseException) as error:
                 _refuse(explain(error))
             except ValueError as error:
                 if composed:

@@ -169,16 +169,21 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         f"{summary['scenario']}, T = {summary['num_slots']}: mean of {summary['episodes']} "
         "episodes on the same fading, 95 % interval"
     )
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("Scheme")
+    table = Table(
+        title=title,
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+    )
+    table.add_column("Scheme", no_wrap=True)
     for heading in (
         "Secrecy sum-rate\n(bps/Hz)",
-        "of own\noptimum",
-        "of hybrid\noptimum",
-        "slots\nrelayed",
+        "own\noptimum",
+        "hybrid\noptimum",
+        "relay\nslots",
         "UEs off-\nloading",
         "off\nmap",
-        "helper\n(kJ)",
     ):
         table.add_column(heading, justify="right", no_wrap=True)
     for scheme, result in summary["schemes"].items():
@@ -191,7 +196,6 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
             _percent(result["relay_share"]),
             _percent(result["offloading_share"]),
             f"{result['off_map']:.1f}",
-            f"{result['helper_energy'] / 1e3:.1f}",
         )
     console.print(table)
     for scheme, result in summary["schemes"].items():

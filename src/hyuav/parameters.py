@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
@@ -34,7 +35,8 @@ def number(
         accepted += f" >= {low:g}"
 
     def convert(name: str, value: Any) -> float:
-        if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
+        refused = isinstance(value, bool | np.bool_ | complex | np.complexfloating | str | bytes)
+        if refused or not hasattr(value, "__float__"):
             raise InputTypeError(rejection(name, value, accepted))
         try:
             result = float(value)
@@ -215,7 +217,10 @@ class Parameters:
             raise InputError(f"{file}: cannot be read ({reason})") from None
         if not isinstance(values, dict):
             raise InputError(f"{file}: expected fields with values")
-        return cls.from_dict({str(name): value for name, value in values.items()})
+        try:
+            return cls.from_dict({str(name): value for name, value in values.items()})
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from None
 
 
 def _as_lists(value: Any) -> Any:

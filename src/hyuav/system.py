@@ -180,6 +180,12 @@ class SecureOffloadingSystem:
             *(low + (high - low) * u for (low, high), u in zip(ranges, uniform, strict=True))
         )
 
+    def mean_tasks(self, shape: tuple[int, ...]) -> Tasks:
+        """Tasks of mean size and mean cycles per bit, for pictures that draw none."""
+        ranges = (self.scenario.task_size, self.scenario.cycles_per_bit)
+        full = (*shape, self.scenario.num_ues)
+        return Tasks(*(self._tensor(sum(bounds) / 2).expand(full) for bounds in ranges))
+
     def channel_gains(self, distances: Tensor, fading: Tensor | None) -> secrecy.ChannelGains:
         """Eq. 3 and 4 for every link.
 
@@ -255,7 +261,12 @@ class SecureOffloadingSystem:
 
         Returns:
             two tensors (...) in bps/Hz.
+
+        Raises:
+            ValueError: no tasks are given though they can fill the edge server.
         """
+        if tasks is None and self.edge_can_saturate:
+            raise ValueError("tasks: expected, because they can fill the edge server")
         distances = self.distances(position)
         gains = self.channel_gains(distances, fading)
         relay = self.relay_outcome(distances, gains, tasks)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import torch
 from matplotlib.axes import Axes
@@ -12,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
@@ -45,7 +47,7 @@ def draw_scenario(axes: Axes, scenario: Scenario, covered: ArrayLike | None = No
     """Draw the map: the UEs, the legitimate UAV with its coverage, the eavesdropper.
 
     The axes are in metres, of equal scale, and end where the map ends. The nodes carry labels
-    for a legend.
+    for a legend. Sizes follow matplotlib's ``lines.markersize`` and ``lines.linewidth``.
 
     Args:
         axes: to draw on.
@@ -61,7 +63,7 @@ def draw_scenario(axes: Axes, scenario: Scenario, covered: ArrayLike | None = No
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(4))
     axes.set_axisbelow(True)
-    axes.grid(color="0.92", linewidth=0.8)
+    axes.grid(color="0.92", linewidth=_width(0.5))
     draw_coverage(axes, scenario.legitimate_position, scenario.coverage_radius, LEGITIMATE_COLOR)
     _draw_uav(axes, scenario.legitimate_position, "legitimate UAV (L)", _LEGITIMATE)
     _draw_uav(axes, scenario.eavesdropper_position, "eavesdropper (E)", _EAVESDROPPER)
@@ -108,11 +110,11 @@ def draw_flight(
         axes.plot(*path[first : last + 1].T, **_slot_style(color, relay=relay) | {"marker": ""})
         axes.plot(*path[first + 1 : last + 1].T, **_slot_style(color, relay=relay) | _DOTS_ONLY)
     ends = _DOTS_ONLY | {"color": color, "markeredgecolor": "white"}
-    axes.plot(*path[0], **ends | {"marker": "D", "markersize": 8})
+    axes.plot(*path[0], **ends | {"marker": "D", "markersize": _size(1.3)})
     if len(path) > 1:
-        axes.plot(*path[-1], **ends | {"marker": "*", "markersize": 12})
+        axes.plot(*path[-1], **ends | {"marker": "*", "markersize": _size(2.0)})
     if label is not None:
-        axes.plot([], [], color=color, linewidth=2.0, label=label)
+        axes.plot([], [], color=color, linewidth=_width(1.3), label=label)
 
 
 def mode_handles(color: str = "0.3") -> list[Line2D]:
@@ -197,9 +199,10 @@ def _draw_ues(axes: Axes, positions: NDArray[np.float64], face: str, label: str)
         *positions.T,
         linestyle="",
         marker="o",
-        markersize=5.5,
+        markersize=_size(0.9),
         markerfacecolor=face,
         markeredgecolor=UE_COLOR,
+        path_effects=[withStroke(linewidth=_width(1.2), foreground="white")],
         label=label,
         clip_on=False,
         zorder=4,
@@ -207,26 +210,27 @@ def _draw_ues(axes: Axes, positions: NDArray[np.float64], face: str, label: str)
 
 
 def _draw_uav(axes: Axes, position: Point, label: str, style: dict[str, Any]) -> None:
-    axes.plot(*position, linestyle="", label=label, clip_on=False, **style)
+    scaled = style | {"markersize": _size(style["markersize"])}
+    axes.plot(*position, linestyle="", label=label, clip_on=False, **scaled)
 
 
 _LEGITIMATE: dict[str, Any] = {
     "color": LEGITIMATE_COLOR,
     "marker": "s",
-    "markersize": 11,
+    "markersize": 1.8,
     "zorder": 2,
 }
 _EAVESDROPPER: dict[str, Any] = {
     "color": EAVESDROPPER_COLOR,
     "marker": "v",
-    "markersize": 14,
+    "markersize": 2.3,
     "zorder": 2,
 }
 # A ring, so that what the helper hovers over stays visible.
 _HELPER: dict[str, Any] = {
     "color": HELPER_COLOR,
     "marker": "o",
-    "markersize": 19,
+    "markersize": 3.2,
     "markerfacecolor": "none",
     "markeredgewidth": 2.0,
     "zorder": 4.5,
@@ -234,13 +238,23 @@ _HELPER: dict[str, Any] = {
 _DOTS_ONLY: dict[str, Any] = {"linestyle": "", "clip_on": False, "zorder": 3}
 
 
+def _size(factor: float) -> float:
+    """A marker's size in points, in proportion to matplotlib's settings."""
+    return factor * float(mpl.rcParams["lines.markersize"])
+
+
+def _width(factor: float) -> float:
+    """A line's width in points, in proportion to matplotlib's settings."""
+    return factor * float(mpl.rcParams["lines.linewidth"])
+
+
 def _slot_style(color: str, *, relay: bool) -> dict[str, Any]:
     return {
         "color": color,
         "linestyle": "-" if relay else (0, (4, 2)),
-        "linewidth": 1.6,
+        "linewidth": _width(1.05),
         "marker": "o",
-        "markersize": 4.5,
+        "markersize": _size(0.75),
         "markerfacecolor": color if relay else "white",
         "zorder": 2.5,
     }

@@ -1,0 +1,172 @@
+"""The recipes as a user calls them, on a problem small enough for a test."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import torch
+
+RECIPES = Path(__file__).parents[2] / "recipes"
+TINY = [
+    "training.num_episodes=4",
+    "training.batch_size=8",
+    "training.evaluation_every=2",
+    "training.evaluation_episodes=3",
+    "algorithm.hidden_sizes=[8]",
+    "scenario.num_slots=10",
+    "logger.mode=disabled",
+]
+
+Call = Callable[..., None]
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Call]:
+    """Run a recipe with arguments in an empty directory."""
+
+    def run(name: str, *arguments: str) -> None:
+        spec = importlib.util.spec_from_file_location(name, RECIPES / f"{name}.py")
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, name, module)
+        spec.loader.exec_module(module)
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", [name, *arguments])
+        module.main()
+
+    yield run
+    torch.set_num_threads(1)
+
+
+def test_training_keeps_a_run(call: Call, tmp_path: Path) -> None:
+    call("train", "scheme=relay", "algorithm=td3", "learners=2", "seed=4", *TINY)
+    (run,) = (tmp_path / "runs").iterdir()
+    assert {path.name for path in run.iterdir()} >= {"config.yaml", "metrics.csv", "checkpoints"}
+    config = (run / "config.yaml").read_text()
+    assert "actor_every: 2" in config
+    assert "num_slots: 10" in config
+    metrics = pd.read_csv(run / "metrics.csv")
+    assert metrics["episode"].max() == 4
+    assert metrics["learner"].unique().tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("algorithm", ["ddpg", "td3", "sac"])
+def test_one_word_swaps_the_algorithm(call: Call, tmp_path: Path, algorithm: str) -> None:
+    call("train", f"algorithm={algorithm}", *TINY)
+    (run,) = (tmp_path / "runs").iterdir()
+    assert f"name: {algorithm}" in (run / "config.yaml").read_text()
+
+
+def test_training_starts_from_another_runs_weights(call: Call, tmp_path: Path) -> None:
+    call("train", "hydra.run.dir=first", *TINY)
+    call("train", "warm_start=first", "learners=2", "hydra.run.dir=second", *TINY)
+    first = pd.read_csv(tmp_path / "first" / "metrics.csv")["best_evaluation"].max()
+    second = pd.read_csv(tmp_path / "second" / "metrics.csv")["best_evaluation"]
+    assert second.dropna().min() >= first - 1e-4
+
+
+def test_saved_runs_are_evaluated_offline(
+    call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for scheme in ("hybrid", "relay", "jamming"):
+        call("train", f"scheme={scheme}", f"hydra.run.dir={scheme}", *TINY)
+    few = ["evaluation.episodes=5", "evaluation.resolution=5"]
+    call("evaluate", "run=[hybrid,relay,jamming]", "output=together", *few)
+    summary = json.loads((tmp_path / "together" / "evaluation.json").read_text())
+    assert set(summary["schemes"]) == {
+        *("proposed", "re_ot", "ja_ot", "re_lt", "ja_lt"),
+        *("optimum", "re_optimum", "ja_optimum"),
+    }
+    assert (tmp_path / "together" / "flights.parquet").exists()
+    assert (tmp_path / "together" / "figures" / "flight_map.pdf").exists()
+    call("evaluate", "run=hybrid", *few)
+    assert json.loads((tmp_path / "hybrid" / "evaluation.json").read_text())["episodes"] == 5
+    printed = capsys.readouterr().out
+    assert "Ja-LT" in printed
+    assert max(map(len, printed.splitlines())) <= 80
+
+
+def test_the_main_job_trains_evaluates_and_draws(call: Call, tmp_path: Path) -> None:
+    call(
+        "reproduce",
+        "candidates=2",
+        "candidate_episodes=2",
+        "evaluation.episodes=4",
+        "evaluation.resolution=5",
+        "hydra.run.dir=job",
+        *TINY,
+    )
+    summary = json.loads((tmp_path / "job" / "evaluation.json").read_text())
+    assert len(summary["schemes"]) == 8
+    figures = {path.name for path in (tmp_path / "job" / "figures").iterdir()}
+    assert figures == {
+        f"{name}.{suffix}"
+        for name in ("learning_curves", "flight_map", "sum_rate_maps")
+        for suffix in ("png", "pdf")
+    }
+
+
+def test_a_straight_flight_too_fast_for_the_horizon_is_left_out_and_named(
+    call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call("train", "hydra.run.dir=short", *TINY, "scenario.num_slots=5")
+    call("evaluate", "run=short", "evaluation.episodes=4", "evaluation.resolution=5")
+    summary = json.loads((tmp_path / "short" / "evaluation.json").read_text())
+    assert "ja_lt" not in summary["schemes"]
+    assert "Ja-LT is left out" in capsys.readouterr().out
+
+
+REFUSALS = [
+    (["train", "algorithm=ppo"], "algorithm = 'ppo': expected one of ddpg, sac, td3"),
+    (["train", "scenario=square"], "scenario = 'square': expected one of"),
+    (["train", "scenario.ue_powr=1"], "scenario: unknown field 'ue_powr': did you mean 'ue_power'"),
+    (["train", "learner=3"], "configuration: unknown field 'learner': did you mean 'learners'"),
+    (["train", "scenario.ue_power=-1"], "ue_power = -1: expected a finite number >= 0"),
+    (["train", "scenario.ue_power=high"], "ue_power = 'high': expected a finite number >= 0"),
+    (["train", "scenario.num_slots=0"], "num_slots = 0: expected a whole number >= 1"),
+    (["train", "scheme=both"], "scheme = 'both': expected one of hybrid, relay, jamming"),
+    (["train", "seed=-3"], "seed = -3: expected a whole number >= 0"),
+    (["train", "seed="], "seed = '': expected a whole number >= 0"),
+    (["train", "algorithm.discount=1.5"], "discount = 1.5: expected a number in [0, 1]"),
+    (["train", "training.num_episodes=1.5"], "num_episodes = 1.5: expected a whole number >= 1"),
+    (["train", "logger.mode=on"], "mode = 'on': expected one of offline, online, disabled"),
+    (["train", "device=tpu9"], "device = 'tpu9': expected a device of this machine"),
+    (["train", "warm_start=nowhere.pt"], "checkpoint = 'nowhere.pt': expected a checkpoint"),
+    (["train", "scenario.ue_positions=[[1,2]"], "no viable alternative at input"),
+    (["train", "=3"], "Config group override must be a string"),
+    (["evaluate"], "run is missing: expected run=DIRECTORY"),
+    (["evaluate", "run=nowhere"], "run = 'nowhere': expected a run directory"),
+    (["reproduce", "evaluation.episodes=1"], "episodes = 1: expected a whole number >= 2"),
+]
+
+
+@pytest.mark.parametrize(("command", "line"), REFUSALS, ids=[" ".join(c) for c, _ in REFUSALS])
+def test_a_mistake_is_answered_by_one_line_and_status_2(
+    call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str], line: str
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        call(*command)
+    assert stopped.value.code == 2
+    errors = capsys.readouterr().err
+    assert errors.startswith("error: ")
+    assert errors.count("\n") == 1
+    assert line in errors
+    assert not list(tmp_path.rglob("metrics.csv"))
+
+
+def test_a_mistake_on_the_command_line_ends_the_process_with_status_2(tmp_path: Path) -> None:
+    ended = subprocess.run(
+        [sys.executable, RECIPES / "train.py", "algorithm=ppo"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 2
+    assert ended.stderr == "error: algorithm = 'ppo': expected one of ddpg, sac, td3\n"
