@@ -47,7 +47,7 @@ class Reproduce(Parameters):
         "evaluation": EvaluationParameters,
         "logger": LoggerParameters,
     },
-    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_reproduce_${scenario.name}",
+    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_reproduce_${hydra:runtime.choices.scenario}",
 )
 def main(config: Config, directory: Path) -> None:
     """Train the three learned schemes side by side, evaluate all eight, draw the figures."""

@@ -35,7 +35,7 @@ class Train(Parameters):
     Train,
     groups={"scenario": "two_clusters", "algorithm": "ddpg"},
     sections={"training": TrainingParameters, "logger": LoggerParameters},
-    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${scenario.name}_${scheme}_${algorithm.name}",
+    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${hydra:runtime.choices.scenario}_${scheme}_${hydra:runtime.choices.algorithm}",
 )
 def main(config: Config, directory: Path) -> None:
     """Train, and say where the run is."""

@@ -83,7 +83,10 @@ def recipe(
             composed = True
             values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
             assert isinstance(values, dict)
-            directory = Path(HydraConfig.get().runtime.output_dir)
+            runtime = HydraConfig.get().runtime
+            for group in groups:  # a user's own file need not repeat its name
+                values[group].setdefault("name", runtime.choices[group])
+            directory = Path(runtime.output_dir)
             try:
                 function({str(key): value for key, value in values.items()}, directory)
             except InputError as error:

@@ -1,5 +1,6 @@
 """The recipes as a user calls them, on a problem small enough for a test."""
 
+import dataclasses
 import importlib.util
 import json
 import subprocess
@@ -10,6 +11,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import torch
+
+from hyuav import Scenario
+from hyuav.runs import RunDirectory
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 TINY = [
@@ -61,6 +65,17 @@ def test_one_word_swaps_the_algorithm(call: Call, tmp_path: Path, algorithm: str
     call("train", f"algorithm={algorithm}", *TINY)
     (run,) = (tmp_path / "runs").iterdir()
     assert f"name: {algorithm}" in (run / "config.yaml").read_text()
+
+
+def test_a_saved_scenario_is_chosen_by_the_name_of_its_file(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "mine" / "scenario").mkdir(parents=True)
+    campus = Scenario(ue_positions=((5.0, 6.0), (-7.0, 8.0)), jamming_power=0.5)
+    campus.save(tmp_path / "mine" / "scenario" / "campus.yaml")
+    call("train", f"--config-dir={tmp_path / 'mine'}", "scenario=campus", *TINY)
+    (run,) = (tmp_path / "runs").iterdir()
+    configuration = RunDirectory(run).configuration()
+    assert configuration.scenario_name == "campus"
+    assert configuration.scenario == dataclasses.replace(campus, num_slots=10)
 
 
 def test_training_starts_from_another_runs_weights(call: Call, tmp_path: Path) -> None:
