@@ -26,7 +26,7 @@ class Evaluate(Parameters):
     run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "run directories")), None)
     output: str | None = parameter(optional(text), None)
     device: str = parameter(text, "cpu")
-    threads: int = parameter(count(), 2)
+    threads: int = parameter(count(), 1)
 
 
 @recipe(

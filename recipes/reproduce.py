@@ -35,7 +35,7 @@ class Reproduce(Parameters):
     candidate_episodes: int = parameter(count(), 50)
     seed: int = parameter(count(0), 0)
     device: str = parameter(text, "cpu")
-    threads: int = parameter(count(), 2)
+    threads: int = parameter(count(), 1)
 
 
 @recipe(

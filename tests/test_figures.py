@@ -33,7 +33,7 @@ def test_a_learning_curve_has_its_schemes_color_and_its_optimum() -> None:
     (axes,) = figure.axes
     curve = next(line for line in axes.lines if line.get_label() == "Proposed")
     assert to_hex(curve.get_color()) == COLORS["proposed"].lower()
-    assert curve.get_ydata()[-1] == pytest.approx(45, abs=6)
+    assert np.asarray(curve.get_ydata())[-1] == pytest.approx(45, abs=6)
     assert any(set(np.atleast_1d(line.get_ydata())) == {55.0} for line in axes.lines)
     assert axes.get_ylabel() == "Accumulated reward (bps/Hz)"
 

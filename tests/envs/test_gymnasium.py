@@ -1,3 +1,5 @@
+"""The Gymnasium environment of one helper, and what a batch of helpers answers alike."""
+
 import copy
 import dataclasses
 import pickle
@@ -12,13 +14,14 @@ import stable_baselines3
 import torch
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from stable_baselines3.common import env_checker
 
 from hyuav import InputError, Scenario, make_env
+from reference import random_actions, torchrl_flight
+
+Build = Callable[..., Any]
 
 SCENARIO = Scenario.preset("two_clusters")
 SHORT = dataclasses.replace(SCENARIO, num_slots=3)
@@ -28,50 +31,21 @@ CORNER_TO_CORNER = dataclasses.replace(
 """The eavesdropper is as far away as can be, and float32 rounds the distance up."""
 
 
-@pytest.fixture(autouse=True)
-def one_thread() -> None:
-    torch.set_num_threads(1)
-
-
-def make(scenario: Scenario | str = SCENARIO, **kwargs: Any) -> Any:
-    return gymnasium.make("hyuav/SecureOffloading-v0", scenario=scenario, **kwargs)
-
-
-def make_vec(num_envs: int = 3, scenario: Scenario | str = SCENARIO, **kwargs: Any) -> Any:
-    return gymnasium.make_vec(
-        "hyuav/SecureOffloading-v0", num_envs=num_envs, scenario=scenario, **kwargs
-    )
-
-
-def random_actions(*shape: int) -> NDArray[np.float32]:
-    return np.random.default_rng(0).uniform(-1.0, 1.0, (*shape, 2)).astype(np.float32)
-
-
-def torchrl_flight(env: Any, actions: NDArray[np.float32]) -> list[Any]:
-    """The entries of each slot when ``actions`` (slots, *batch, 2) are flown in ``env``."""
-    state, slots = env.reset(), []
-    for action in actions:
-        flown = env.step(state.set("action", torch.from_numpy(action)))
-        slots.append(flown["next"])
-        state = env.step_mdp(flown)
-    return slots
-
-
 @pytest.mark.parametrize("scheme", ["hybrid", "relay", "jamming"])
 @pytest.mark.parametrize("clock", [False, True])
-def test_gymnasium_s_checker_has_nothing_to_say(scheme: str, clock: bool) -> None:
+def test_gymnasium_s_checker_has_nothing_to_say(make: Build, scheme: str, clock: bool) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(make("two_clusters", scheme=scheme, clock=clock).unwrapped)
 
 
-def test_stable_baselines_checker_has_nothing_to_say() -> None:
+def test_stable_baselines_checker_has_nothing_to_say(make: Build) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env_checker.check_env(make().unwrapped)
 
 
-def test_gymnasium_s_passive_checker_is_silent_over_an_episode_with_pictures() -> None:
+def test_gymnasium_s_passive_checker_is_silent_over_an_episode_with_pictures(make: Build) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = make(SHORT, render_mode="rgb_array")
@@ -85,7 +59,7 @@ def test_gymnasium_s_passive_checker_is_silent_over_an_episode_with_pictures() -
 @pytest.mark.parametrize("clock", [False, True])
 @pytest.mark.parametrize("scheme", ["hybrid", "relay", "jamming"])
 def test_a_flight_is_that_of_the_torchrl_environment_with_the_same_seed(
-    scheme: str, clock: bool
+    make: Build, scheme: str, clock: bool
 ) -> None:
     actions = random_actions(SCENARIO.num_slots)
     env = make(scheme=scheme, clock=clock)
@@ -102,14 +76,14 @@ def test_a_flight_is_that_of_the_torchrl_environment_with_the_same_seed(
         assert info["off_map"] is slot["off_map"].item()
 
 
-def test_an_episode_is_truncated_after_its_slots_and_never_terminated() -> None:
+def test_an_episode_is_truncated_after_its_slots_and_never_terminated(make: Build) -> None:
     env = make()
     env.reset(seed=0)
     ends = [env.step(action)[2:4] for action in random_actions(SCENARIO.num_slots)]
     assert ends == [(False, False)] * (SCENARIO.num_slots - 1) + [(False, True)]
 
 
-def test_the_off_map_penalty_lowers_the_reward_but_not_the_secrecy_sum_rate() -> None:
+def test_the_off_map_penalty_lowers_the_reward_but_not_the_secrecy_sum_rate(make: Build) -> None:
     env = make("random_disk", scheme="jamming")
     env.reset(seed=0, options={"position": (100.0, 100.0)})
     _, reward, _, _, info = env.step(np.ones(2, np.float32))
@@ -119,18 +93,18 @@ def test_the_off_map_penalty_lowers_the_reward_but_not_the_secrecy_sum_rate() ->
     assert info["secrecy_sum_rate"] - reward == pytest.approx(0.2, abs=1e-6)
 
 
-def test_on_the_map_the_reward_is_the_secrecy_sum_rate() -> None:
+def test_on_the_map_the_reward_is_the_secrecy_sum_rate(make: Build) -> None:
     env = make("random_disk", scheme="jamming")
     env.reset(seed=0, options={"position": (80.0, 80.0)})
     _, reward, _, _, info = env.step(np.zeros(2, np.float32))
     assert reward == info["secrecy_sum_rate"] > 0.0
 
 
-def test_nothing_is_earned_before_the_first_slot() -> None:
+def test_nothing_is_earned_before_the_first_slot(make: Build) -> None:
     assert make().reset(seed=0)[1]["secrecy_sum_rate"] == 0.0
 
 
-def test_a_reset_starts_at_helper_start_or_where_it_is_told() -> None:
+def test_a_reset_starts_at_helper_start_or_where_it_is_told(make: Build) -> None:
     env = make()
     assert tuple(env.reset(seed=0)[1]["position"]) == SCENARIO.helper_start
     observation, info = env.reset(options={"position": (25, -50.0)})
@@ -139,7 +113,7 @@ def test_a_reset_starts_at_helper_start_or_where_it_is_told() -> None:
     assert tuple(env.reset()[1]["position"]) == SCENARIO.helper_start
 
 
-def test_without_a_seed_the_random_numbers_go_on() -> None:
+def test_without_a_seed_the_random_numbers_go_on(make: Build) -> None:
     env = make()
 
     def first_reward() -> float:
@@ -154,7 +128,7 @@ def test_without_a_seed_the_random_numbers_go_on() -> None:
     assert (first_reward(), second != first) == (first, True)
 
 
-def test_two_environments_that_were_never_seeded_differ() -> None:
+def test_two_environments_that_were_never_seeded_differ(make: Build) -> None:
     rewards = set()
     for _ in range(2):
         torch.manual_seed(0)
@@ -170,7 +144,7 @@ def test_two_environments_that_were_never_seeded_differ() -> None:
     corner=st.tuples(*[st.sampled_from([-1.0, 1.0])] * 2),
 )
 def test_every_observation_lies_in_its_space_up_to_the_map_s_corners(
-    start: tuple[float, float], corner: tuple[float, float]
+    make: Build, start: tuple[float, float], corner: tuple[float, float]
 ) -> None:
     env = make(CORNER_TO_CORNER, clock=True).unwrapped
     observation, _ = env.reset(seed=0, options={"position": start})
@@ -180,14 +154,14 @@ def test_every_observation_lies_in_its_space_up_to_the_map_s_corners(
         assert observation in env.observation_space
 
 
-def test_the_bound_on_distances_is_reached_across_the_map() -> None:
+def test_the_bound_on_distances_is_reached_across_the_map(make: Build) -> None:
     env = make(CORNER_TO_CORNER).unwrapped
     observation, _ = env.reset(seed=0)
     assert observation in env.observation_space
     assert observation[-1] == pytest.approx(env.observation_space.high[-1], abs=2e-5)
 
 
-def test_writing_to_what_was_returned_does_not_move_the_helper() -> None:
+def test_writing_to_what_was_returned_does_not_move_the_helper(make: Build) -> None:
     calm, rude = make(), make()
     calm.reset(seed=0)
     for array in (rude.reset(seed=0)[0], rude.reset(seed=0)[1]["position"]):
@@ -197,9 +171,8 @@ def test_writing_to_what_was_returned_does_not_move_the_helper() -> None:
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-@pytest.mark.parametrize("build", [make, make_vec])
 def test_a_copy_flies_on_with_the_same_random_numbers(
-    build: Callable[..., Any], duplicate: Callable[[Any], Any]
+    build: Build, duplicate: Callable[[Any], Any]
 ) -> None:
     env = build()
     env.reset(seed=0)
@@ -209,7 +182,7 @@ def test_a_copy_flies_on_with_the_same_random_numbers(
     np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
 
 
-def test_a_spec_makes_the_same_environment_again() -> None:
+def test_a_spec_makes_the_same_environment_again(make: Build, make_vec: Build) -> None:
     env = make("random_disk", scheme="relay", clock=True)
     again = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
     np.testing.assert_array_equal(env.reset(seed=1)[0], again.reset(seed=1)[0])
@@ -227,10 +200,9 @@ BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize("build", [make, make_vec])
 @pytest.mark.parametrize(("arguments", "message"), BAD_ARGUMENTS)
 def test_bad_arguments_are_refused_in_one_line(
-    build: Callable[..., Any], arguments: dict[str, Any], message: str
+    build: Build, arguments: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(InputError, match=message) as refusal:
         build(**arguments)
@@ -238,15 +210,9 @@ def test_bad_arguments_are_refused_in_one_line(
 
 
 @pytest.mark.filterwarnings("ignore:.*render_mode.*:UserWarning")
-def test_an_unknown_render_mode_is_refused() -> None:
+def test_an_unknown_render_mode_is_refused(make: Build) -> None:
     with pytest.raises(InputError, match="render_mode = 'ascii'"):
         make(render_mode="ascii")
-
-
-@pytest.mark.parametrize("num_envs", [0, True, 1.5])
-def test_a_batch_of_no_helpers_is_refused(num_envs: Any) -> None:
-    with pytest.raises(InputError, match="num_envs"):
-        make_vec(num_envs)
 
 
 BAD_RESETS: list[tuple[dict[str, Any], str]] = [
@@ -259,22 +225,11 @@ BAD_RESETS: list[tuple[dict[str, Any], str]] = [
     ({"options": {"position": (0.0, float("nan"))}}, "position ="),
     ({"options": {"position": (0.0, 100.5)}}, "on the map"),
 ]
-BAD_VECTOR_RESETS: list[tuple[dict[str, Any], str]] = [
-    ({"seed": [1, 2, 3]}, "seed ="),
-    ({"options": {"position": [(0.0, 0.0)] * 2}}, "position ="),
-    ({"options": {"reset_mask": np.array([True])}}, "reset_mask ="),
-    ({"options": {"reset_mask": np.array([1, 0, 0])}}, "reset_mask ="),
-    ({"options": {"reset_mask": np.zeros(3, bool)}}, "reset_mask ="),
-]
 
 
-@pytest.mark.parametrize(
-    ("build", "arguments", "message"),
-    [(make, *case) for case in BAD_RESETS]
-    + [(make_vec, *case) for case in BAD_RESETS + BAD_VECTOR_RESETS],
-)
+@pytest.mark.parametrize(("arguments", "message"), BAD_RESETS)
 def test_a_bad_reset_is_refused_in_one_line(
-    build: Callable[..., Any], arguments: dict[str, Any], message: str
+    build: Build, arguments: dict[str, Any], message: str
 ) -> None:
     env = build().unwrapped
     env.reset(seed=0)
@@ -284,8 +239,7 @@ def test_a_bad_reset_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize("action", [[0.0], [[0.0, 0.0]] * 4, [0.0, np.nan], "up", None])
-@pytest.mark.parametrize("build", [make, make_vec])
-def test_a_bad_action_is_refused_in_one_line(build: Callable[..., Any], action: Any) -> None:
+def test_a_bad_action_is_refused_in_one_line(build: Build, action: Any) -> None:
     env = build().unwrapped
     env.reset(seed=0)
     with pytest.raises(InputError, match="action") as refusal:
@@ -293,14 +247,13 @@ def test_a_bad_action_is_refused_in_one_line(build: Callable[..., Any], action: 
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize("build", [make, make_vec])
-def test_nothing_can_be_flown_before_a_reset(build: Callable[..., Any]) -> None:
+def test_nothing_can_be_flown_before_a_reset(build: Build) -> None:
     env = build().unwrapped
     with pytest.raises(ResetNeeded):
         env.step(np.zeros(env.action_space.shape, np.float32))
 
 
-def test_an_action_beyond_the_speed_limit_is_clipped() -> None:
+def test_an_action_beyond_the_speed_limit_is_clipped(make: Build) -> None:
     positions = []
     for action in ([5.0, -5.0], [1.0, -1.0]):
         env = make().unwrapped
@@ -309,7 +262,7 @@ def test_an_action_beyond_the_speed_limit_is_clipped() -> None:
     assert positions == [(20.0, -20.0)] * 2
 
 
-def test_ddpg_of_stable_baselines_trains_on_it() -> None:
+def test_ddpg_of_stable_baselines_trains_on_it(make: Build) -> None:
     model = stable_baselines3.DDPG(
         "MlpPolicy", make(SHORT), learning_starts=20, batch_size=16, seed=0, device="cpu"
     )
@@ -322,107 +275,7 @@ def test_ddpg_of_stable_baselines_trains_on_it() -> None:
     assert np.isfinite(action).all()
 
 
-def test_a_batch_flies_as_the_torchrl_environment_of_that_batch_size() -> None:
-    actions = random_actions(SCENARIO.num_slots, 3)
-    env = make_vec(clock=True)
-    env.reset(seed=7)
-    expected = torchrl_flight(make_env(SCENARIO, "hybrid", 3, seed=7, clock=True), actions)
-    for action, slot in zip(actions, expected, strict=True):
-        observation, reward, terminated, truncated, info = env.step(action)
-        if truncated.all():
-            observation, info = info["final_obs"], info["final_info"]
-        np.testing.assert_array_equal(observation, slot["observation"])
-        np.testing.assert_array_equal(reward, slot["reward"].squeeze(-1))
-        np.testing.assert_array_equal(truncated, slot["truncated"].squeeze(-1))
-        assert not terminated.any()
-        np.testing.assert_array_equal(info["position"], slot["position"])
-        np.testing.assert_array_equal(info["mode"], slot["mode"].squeeze(-1))
-        np.testing.assert_array_equal(info["off_map"], slot["off_map"].squeeze(-1))
-    assert truncated.all()
-
-
-def test_a_row_s_spaces_are_those_of_one_helper() -> None:
-    env, vector = make(clock=True), make_vec(clock=True)
-    assert vector.single_observation_space == env.observation_space
-    assert vector.single_action_space == env.action_space
-    assert vector.observation_space.shape == (3, *env.observation_space.shape)
-    assert vector.reset(seed=0)[0] in vector.observation_space
-    assert vector.step(vector.action_space.sample())[0] in vector.observation_space
-
-
-def test_a_row_earns_what_one_helper_earns_on_average() -> None:
-    hovering = {"position": (80.0, 80.0)}
-    rows, env = make_vec(2000, scheme="jamming"), make(scheme="jamming")
-    rows.reset(seed=0, options=hovering)
-    batch = rows.step(np.zeros((2000, 2), np.float32))[1]
-    env.reset(seed=1, options=hovering)
-    single = np.array([env.step(np.zeros(2, np.float32))[1] for _ in range(500)])
-    error = np.hypot(batch.std() / np.sqrt(batch.size), single.std() / np.sqrt(single.size))
-    assert abs(batch.mean() - single.mean()) < 4.0 * error
-    assert np.unique(batch).size > 1900
-
-
-def test_a_row_that_has_flown_its_slots_starts_anew_in_the_same_step() -> None:
-    env = make_vec(2, SHORT)
-    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
-    env.reset(seed=0)
-    for slot in range(2 * SHORT.num_slots):
-        observation, _, _, truncated, info = env.step(np.full((2, 2), 0.5, np.float32))
-        ends = slot % SHORT.num_slots == SHORT.num_slots - 1
-        flown = 10.0 * (slot % SHORT.num_slots + 1)
-        assert truncated.tolist() == [ends] * 2
-        assert ("final_obs" in info) is ends
-        last = info["final_info"] if ends else info
-        np.testing.assert_allclose(last["position"], -60.0 + flown)
-        if ends:
-            np.testing.assert_allclose(info["final_obs"][:, :2], (-60.0 + flown) / 100.0)
-            np.testing.assert_allclose(observation[:, :2], -0.6)
-            np.testing.assert_allclose(info["position"], -60.0)
-
-
-def test_rows_reset_by_a_mask_start_anew_and_the_others_fly_on() -> None:
-    env = make_vec(3, SHORT, clock=True)
-    action = np.full((3, 2), 0.5, np.float32)
-    env.reset(seed=0)
-    before = env.step(action)[0]
-    mask = np.array([False, True, False])
-    kept = before.copy()
-    after, info = env.reset(options={"reset_mask": mask, "position": (0.0, 5.0)})
-    np.testing.assert_array_equal(before, kept)
-    np.testing.assert_array_equal(after[~mask], before[~mask])
-    np.testing.assert_allclose(after[mask][:, :2], [[0.0, 0.05]])
-    np.testing.assert_array_equal(after[mask][:, -1], -1.0)
-    np.testing.assert_array_equal(info["_position"], mask)
-    env.step(action)
-    observation, _, _, truncated, info = env.step(action)
-    np.testing.assert_array_equal(truncated, ~mask)
-    np.testing.assert_array_equal(info["_final_obs"], ~mask)
-    np.testing.assert_allclose(info["position"], [[-60, -60], [20, 25], [-60, -60]])
-    np.testing.assert_allclose(observation[:, :2] * 100.0, info["position"], rtol=1e-5)
-    np.testing.assert_array_equal(env.step(action)[3], mask)
-
-
-def test_gymnasium_s_own_wrappers_understand_the_batch() -> None:
-    wrappers = gymnasium.wrappers.vector
-    env = wrappers.DictInfoToList(wrappers.RecordEpisodeStatistics(make_vec(2, SHORT)))
-    env.reset(seed=0)
-    earned = np.zeros(2)
-    for action in random_actions(SHORT.num_slots, 2):
-        _, reward, _, _, infos = env.step(action)
-        earned += reward
-    assert [info["episode"]["l"] for info in infos] == [SHORT.num_slots] * 2
-    np.testing.assert_allclose([info["episode"]["r"] for info in infos], earned)
-    assert tuple(infos[0]["position"]) == SCENARIO.helper_start
-
-
-def test_each_row_may_fly_its_own_scheme() -> None:
-    env = make_vec(2, scheme=("relay", "jamming"))
-    env.reset(seed=0)
-    modes = [env.step(action)[4]["mode"].tolist() for action in random_actions(5, 2)]
-    assert modes == [[1, 0]] * 5
-
-
-def test_a_picture_is_drawn_of_every_slot_and_changes_with_it() -> None:
+def test_a_picture_is_drawn_of_every_slot_and_changes_with_it(make: Build) -> None:
     env = make(SHORT, render_mode="rgb_array")
     env.reset(seed=0)
     first = env.render()
@@ -432,20 +285,7 @@ def test_a_picture_is_drawn_of_every_slot_and_changes_with_it() -> None:
     assert (env.render() != first).any()
 
 
-def test_each_row_s_picture_shows_its_own_flight() -> None:
-    env = make_vec(2, SHORT, render_mode="rgb_array")
-    env.reset(seed=0)
-    at_the_start = env.render()
-    env.step(np.full((2, 2), 0.5, np.float32))
-    flown = env.render()
-    env.reset(options={"reset_mask": np.array([True, False])})
-    after = env.render()
-    np.testing.assert_array_equal(after[0], at_the_start[0])
-    np.testing.assert_array_equal(after[1], flown[1])
-    assert (flown[1] != at_the_start[1]).any()
-
-
-def test_without_a_render_mode_there_is_no_picture() -> None:
+def test_without_a_render_mode_there_is_no_picture(make: Build, make_vec: Build) -> None:
     for env in (make().unwrapped, make_vec()):
         env.reset(seed=0)
         assert env.render() is None

@@ -1,0 +1,43 @@
+"""Shared by all tests: one thread, reproducible property tests, and Gymnasium environments."""
+
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import pytest
+import torch
+from hypothesis import settings
+
+import hyuav  # noqa: F401 - registers the environments
+
+torch.set_num_threads(1)
+settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=True)
+settings.load_profile("hyuav")
+
+
+@pytest.fixture(scope="session")
+def make() -> Callable[..., Any]:
+    """Make the Gymnasium environment of one helper."""
+
+    def build(scenario: Any = "two_clusters", **kwargs: Any) -> Any:
+        return gymnasium.make("hyuav/SecureOffloading-v0", scenario=scenario, **kwargs)
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def make_vec() -> Callable[..., Any]:
+    """Make the Gymnasium environment of a batch of helpers."""
+
+    def build(num_envs: int = 3, scenario: Any = "two_clusters", **kwargs: Any) -> Any:
+        return gymnasium.make_vec(
+            "hyuav/SecureOffloading-v0", num_envs=num_envs, scenario=scenario, **kwargs
+        )
+
+    return build
+
+
+@pytest.fixture(scope="session", params=["make", "make_vec"])
+def build(request: pytest.FixtureRequest) -> Any:
+    """Either of both."""
+    return request.getfixturevalue(request.param)

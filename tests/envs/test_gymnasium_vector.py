@@ -1,0 +1,157 @@
+"""The Gymnasium environment of a batch of helpers: rows, their resets and their pictures."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from hyuav import InputError, Scenario, make_env
+from reference import random_actions, torchrl_flight
+
+Build = Callable[..., Any]
+
+SCENARIO = Scenario.preset("two_clusters")
+SHORT = dataclasses.replace(SCENARIO, num_slots=3)
+
+
+@pytest.mark.parametrize("num_envs", [0, True, 1.5])
+def test_a_batch_of_no_helpers_is_refused(make_vec: Build, num_envs: Any) -> None:
+    with pytest.raises(InputError, match="num_envs"):
+        make_vec(num_envs)
+
+
+BAD_VECTOR_RESETS: list[tuple[dict[str, Any], str]] = [
+    ({"seed": [1, 2, 3]}, "seed ="),
+    ({"options": {"position": [(0.0, 0.0)] * 2}}, "position ="),
+    ({"options": {"reset_mask": np.array([True])}}, "reset_mask ="),
+    ({"options": {"reset_mask": np.array([1, 0, 0])}}, "reset_mask ="),
+    ({"options": {"reset_mask": np.zeros(3, bool)}}, "reset_mask ="),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD_VECTOR_RESETS)
+def test_a_bad_reset_of_rows_is_refused_in_one_line(
+    make_vec: Build, arguments: dict[str, Any], message: str
+) -> None:
+    env = make_vec().unwrapped
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=message) as refusal:
+        env.reset(**arguments)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_batch_flies_as_the_torchrl_environment_of_that_batch_size(make_vec: Build) -> None:
+    actions = random_actions(SCENARIO.num_slots, 3)
+    env = make_vec(clock=True)
+    env.reset(seed=7)
+    expected = torchrl_flight(make_env(SCENARIO, "hybrid", 3, seed=7, clock=True), actions)
+    for action, slot in zip(actions, expected, strict=True):
+        observation, reward, terminated, truncated, info = env.step(action)
+        if truncated.all():
+            observation, info = info["final_obs"], info["final_info"]
+        np.testing.assert_array_equal(observation, slot["observation"])
+        np.testing.assert_array_equal(reward, slot["reward"].squeeze(-1))
+        np.testing.assert_array_equal(truncated, slot["truncated"].squeeze(-1))
+        assert not terminated.any()
+        np.testing.assert_array_equal(info["position"], slot["position"])
+        np.testing.assert_array_equal(info["mode"], slot["mode"].squeeze(-1))
+        np.testing.assert_array_equal(info["off_map"], slot["off_map"].squeeze(-1))
+    assert truncated.all()
+
+
+def test_a_row_s_spaces_are_those_of_one_helper(make: Build, make_vec: Build) -> None:
+    env, vector = make(clock=True), make_vec(clock=True)
+    assert vector.single_observation_space == env.observation_space
+    assert vector.single_action_space == env.action_space
+    assert vector.observation_space.shape == (3, *env.observation_space.shape)
+    assert vector.reset(seed=0)[0] in vector.observation_space
+    assert vector.step(vector.action_space.sample())[0] in vector.observation_space
+
+
+def test_a_row_earns_what_one_helper_earns_on_average(make: Build, make_vec: Build) -> None:
+    hovering = {"position": (80.0, 80.0)}
+    rows, env = make_vec(2000, scheme="jamming"), make(scheme="jamming")
+    rows.reset(seed=0, options=hovering)
+    batch = rows.step(np.zeros((2000, 2), np.float32))[1]
+    env.reset(seed=1, options=hovering)
+    single = np.array([env.step(np.zeros(2, np.float32))[1] for _ in range(500)])
+    error = np.hypot(batch.std() / np.sqrt(batch.size), single.std() / np.sqrt(single.size))
+    assert abs(batch.mean() - single.mean()) < 4.0 * error
+    assert np.unique(batch).size > 1900
+
+
+def test_a_row_that_has_flown_its_slots_starts_anew_in_the_same_step(make_vec: Build) -> None:
+    env = make_vec(2, SHORT)
+    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    env.reset(seed=0)
+    for slot in range(2 * SHORT.num_slots):
+        observation, _, _, truncated, info = env.step(np.full((2, 2), 0.5, np.float32))
+        ends = slot % SHORT.num_slots == SHORT.num_slots - 1
+        flown = 10.0 * (slot % SHORT.num_slots + 1)
+        assert truncated.tolist() == [ends] * 2
+        assert ("final_obs" in info) is ends
+        last = info["final_info"] if ends else info
+        np.testing.assert_allclose(last["position"], -60.0 + flown)
+        if ends:
+            np.testing.assert_allclose(info["final_obs"][:, :2], (-60.0 + flown) / 100.0)
+            np.testing.assert_allclose(observation[:, :2], -0.6)
+            np.testing.assert_allclose(info["position"], -60.0)
+
+
+def test_rows_reset_by_a_mask_start_anew_and_the_others_fly_on(make_vec: Build) -> None:
+    env = make_vec(3, SHORT, clock=True)
+    action = np.full((3, 2), 0.5, np.float32)
+    env.reset(seed=0)
+    before = env.step(action)[0]
+    mask = np.array([False, True, False])
+    kept = before.copy()
+    after, info = env.reset(options={"reset_mask": mask, "position": (0.0, 5.0)})
+    np.testing.assert_array_equal(before, kept)
+    np.testing.assert_array_equal(after[~mask], before[~mask])
+    np.testing.assert_allclose(after[mask][:, :2], [[0.0, 0.05]])
+    np.testing.assert_array_equal(after[mask][:, -1], -1.0)
+    np.testing.assert_array_equal(info["_position"], mask)
+    env.step(action)
+    observation, _, _, truncated, info = env.step(action)
+    np.testing.assert_array_equal(truncated, ~mask)
+    np.testing.assert_array_equal(info["_final_obs"], ~mask)
+    np.testing.assert_allclose(info["position"], [[-60, -60], [20, 25], [-60, -60]])
+    np.testing.assert_allclose(observation[:, :2] * 100.0, info["position"], rtol=1e-5)
+    np.testing.assert_array_equal(env.step(action)[3], mask)
+
+
+def test_gymnasium_s_own_wrappers_understand_the_batch(make_vec: Build) -> None:
+    wrappers = gymnasium.wrappers.vector
+    env = wrappers.DictInfoToList(wrappers.RecordEpisodeStatistics(make_vec(2, SHORT)))
+    env.reset(seed=0)
+    earned = np.zeros(2)
+    for action in random_actions(SHORT.num_slots, 2):
+        _, reward, _, _, infos = env.step(action)
+        earned += reward
+    assert [info["episode"]["l"] for info in infos] == [SHORT.num_slots] * 2
+    np.testing.assert_allclose([info["episode"]["r"] for info in infos], earned)
+    assert tuple(infos[0]["position"]) == SCENARIO.helper_start
+
+
+def test_each_row_may_fly_its_own_scheme(make_vec: Build) -> None:
+    env = make_vec(2, scheme=("relay", "jamming"))
+    env.reset(seed=0)
+    modes = [env.step(action)[4]["mode"].tolist() for action in random_actions(5, 2)]
+    assert modes == [[1, 0]] * 5
+
+
+def test_each_row_s_picture_shows_its_own_flight(make_vec: Build) -> None:
+    env = make_vec(2, SHORT, render_mode="rgb_array")
+    env.reset(seed=0)
+    at_the_start = env.render()
+    env.step(np.full((2, 2), 0.5, np.float32))
+    flown = env.render()
+    env.reset(options={"reset_mask": np.array([True, False])})
+    after = env.render()
+    np.testing.assert_array_equal(after[0], at_the_start[0])
+    np.testing.assert_array_equal(after[1], flown[1])
+    assert (flown[1] != at_the_start[1]).any()
