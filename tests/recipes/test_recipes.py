@@ -1,21 +1,21 @@
 """The recipes as a user calls them, on a problem small enough for a test."""
 
 import dataclasses
-import importlib.util
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
 import pytest
-import torch
 
 from hyuav import Scenario
 from hyuav.runs import RunDirectory
 
 RECIPES = Path(__file__).parents[2] / "recipes"
+Call = Callable[..., None]
+
 TINY = [
     "training.num_episodes=4",
     "training.batch_size=8",
@@ -25,27 +25,6 @@ TINY = [
     "scenario.num_slots=10",
     "logger.mode=disabled",
 ]
-
-Call = Callable[..., None]
-
-
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Call]:
-    """Run a recipe with arguments in an empty directory."""
-
-    def run(name: str, *arguments: str) -> None:
-        spec = importlib.util.spec_from_file_location(name, RECIPES / f"{name}.py")
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        monkeypatch.setitem(sys.modules, name, module)
-        spec.loader.exec_module(module)
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", [name, *arguments])
-        module.main()
-
-    yield run
-    torch.set_num_threads(1)
 
 
 def test_training_keeps_a_run(call: Call, tmp_path: Path) -> None:
