@@ -16,7 +16,7 @@ from hyuav.evaluation import EvaluationParameters, evaluate
 from hyuav.experiment import learned_policies, print_results, reference_policies
 from hyuav.figures import flight_map, save_figure
 from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text
-from hyuav.runs import RunDirectory
+from hyuav.runs import RunDirectory, require_writable
 
 
 @dataclass(frozen=True)
@@ -45,16 +45,19 @@ def main(config: Config, _: Path) -> None:
     torch.set_num_threads(options.threads)
     runs = [RunDirectory(path) for path in options.run]
     first = runs[0].configuration()
+    if len(set(options.run)) < len(runs):
+        raise InputError(rejection("run", list(options.run), "different run directories"))
     for run in runs[1:]:
         if run.configuration().scenario != first.scenario:
             raise InputError(rejection("run", str(run.path), f"the scenario of {runs[0].path}"))
     console = Console()
+    output = runs[0].path if options.output is None else Path(options.output)
+    require_writable("output", output / "figures")
     policies = {
         **learned_policies(runs, first.scenario),
         **reference_policies(first.scenario, parameters.resolution, console),
     }
     evaluation = evaluate(first.scenario, first.scenario_name, policies, parameters, options.device)
-    output = runs[0].path if options.output is None else Path(options.output)
     evaluation.save(output)
     save_figure(flight_map(first.scenario, evaluation.flights), output / "figures", "flight_map")
     print_results(evaluation, console)

@@ -47,7 +47,7 @@ class Reproduce(Parameters):
         "evaluation": EvaluationParameters,
         "logger": LoggerParameters,
     },
-    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_reproduce_${hydra:runtime.choices.scenario}",
+    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_reproduce_${hydra.runtime.choices.scenario}",
 )
 def main(config: Config, directory: Path) -> None:
     """Train the three learned schemes side by side, evaluate all eight, draw the figures."""
@@ -67,6 +67,7 @@ def main(config: Config, directory: Path) -> None:
         options.seed,
     )
     console = Console()
+    references = reference_policies(scenario, parameters.resolution, console)
     initial_weights = None
     if options.candidates > 1:
         initial_weights, earned = select_initial_weights(
@@ -87,11 +88,9 @@ def main(config: Config, directory: Path) -> None:
         console,
         device=options.device,
         initial_weights=initial_weights,
+        request=config,
     )
-    policies = {
-        **learned_policies([run], scenario),
-        **reference_policies(scenario, parameters.resolution, console),
-    }
+    policies = {**learned_policies([run], scenario), **references}
     evaluation = evaluate(scenario, scenario_name, policies, parameters, options.device)
     evaluation.save(run.path)
     draw_figures(run.figures, scenario, evaluation, run.metrics())

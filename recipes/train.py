@@ -35,7 +35,8 @@ class Train(Parameters):
     Train,
     groups={"scenario": "two_clusters", "algorithm": "ddpg"},
     sections={"training": TrainingParameters, "logger": LoggerParameters},
-    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${hydra:runtime.choices.scenario}_${scheme}_${hydra:runtime.choices.algorithm}",
+    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${hydra.runtime.choices.scenario}_${scheme}"
+    "_${hydra.runtime.choices.algorithm}_${seed}",
 )
 def main(config: Config, directory: Path) -> None:
     """Train, and say where the run is."""
@@ -59,6 +60,7 @@ def main(config: Config, directory: Path) -> None:
         LoggerParameters.from_dict(config["logger"]),
         console,
         device=options.device,
+        request=config,
         initial_weights=None if options.warm_start is None else saved_weights(options.warm_start),
     )
     best = run.metrics()["best_evaluation"].dropna().tail(options.learners)

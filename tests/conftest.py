@@ -1,6 +1,9 @@
-"""Shared by all tests: one thread, reproducible property tests, and Gymnasium environments."""
+"""Shared by all tests: one thread, reproducible property tests, environments and recipes."""
 
-from collections.abc import Callable
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -9,6 +12,8 @@ import torch
 from hypothesis import settings
 
 import hyuav  # noqa: F401 - registers the environments
+
+RECIPES = Path(__file__).parents[1] / "recipes"
 
 torch.set_num_threads(1)
 settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=True)
@@ -41,3 +46,22 @@ def make_vec() -> Callable[..., Any]:
 def build(request: pytest.FixtureRequest) -> Any:
     """Either of both."""
     return request.getfixturevalue(request.param)
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[..., None]]:
+    """Run a recipe with arguments in an empty directory."""
+
+    def run(name: str, *arguments: str) -> None:
+        spec = importlib.util.spec_from_file_location(name, RECIPES / f"{name}.py")
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, name, module)
+        spec.loader.exec_module(module)
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", [name, *arguments])
+        module.main()
+
+    yield run
+    torch.set_num_threads(1)

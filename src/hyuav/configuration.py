@@ -1,12 +1,14 @@
 """Hydra for the recipes: typed defaults by name, and one line for every mistake."""
 
+import argparse
 import dataclasses
 import logging
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
+from unittest import mock
 
 import hydra
 from hydra.core.config_store import ConfigStore
@@ -81,25 +83,21 @@ def recipe(
         def run(config: DictConfig) -> None:
             nonlocal composed
             composed = True
-            values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
-            assert isinstance(values, dict)
-            runtime = HydraConfig.get().runtime
-            for group in groups:  # a user's own file need not repeat its name
-                values[group].setdefault("name", runtime.choices[group])
-            directory = Path(runtime.output_dir)
+            directory = Path(HydraConfig.get().runtime.output_dir)
             try:
-                function({str(key): value for key, value in values.items()}, directory)
+                function(_plain(config, groups), directory)
             except InputError as error:
+                _remove_if_empty(directory)
                 _refuse(str(error))  # here, before Hydra adds lines of its own
 
         def command() -> None:
-            os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the line below
+            os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
+            one_line = mock.patch.object(argparse.ArgumentParser, "print_usage")
             try:
-                hydra.main(version_base=None, config_path=None, config_name=name)(run)()
-            except (HydraException, OmegaConfBaseException) as error:
-                _refuse(explain(error))
-            except ValueError as error:
+                with one_line:
+                    hydra.main(version_base=None, config_path=None, config_name=name)(run)()
+            except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
                 if composed:
                     raise
                 _refuse(explain(error))
@@ -110,6 +108,19 @@ def recipe(
         return command
 
     return decorate
+
+
+def _plain(config: DictConfig, groups: Iterable[str]) -> Config:
+    values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
+    assert isinstance(values, dict)
+    for group in groups:  # a user's own file need not repeat its name
+        values[group].setdefault("name", HydraConfig.get().runtime.choices[group])
+    return {str(key): value for key, value in values.items()}
+
+
+def _remove_if_empty(directory: Path) -> None:
+    if directory.is_dir() and not any(directory.iterdir()) and directory.resolve() != Path.cwd():
+        directory.rmdir()
 
 
 def section(config: Config, parameters: type[Record]) -> Record:

@@ -14,6 +14,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
 from hyuav.envs.transforms import make_env
+from hyuav.errors import InputError, rejection, require_choice
 from hyuav.parameters import Parameters, count, number, parameter
 from hyuav.scenario import Scenario
 from hyuav.schemes.optimum import RESOLUTION
@@ -103,7 +104,16 @@ def evaluate(
             Fractions of the optimum are given where the optima are among them.
         parameters: how many episodes, how many of them kept slot by slot, and the seed.
         device: to fly on.
+
+    Raises:
+        InputError: no scheme, an unknown one, or one without a policy.
     """
+    for scheme, several in policies.items():
+        require_choice("scheme", scheme, LABELS)
+        if not several:
+            raise InputError(rejection(f"policies[{scheme!r}]", several, "at least one policy"))
+    if not policies:
+        raise InputError(rejection("policies", policies, "at least one scheme"))
     flown = {
         scheme: torch.stack(
             [

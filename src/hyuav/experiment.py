@@ -1,8 +1,9 @@
 """What the recipes do: train into a run directory, gather the schemes, evaluate, draw."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from rich import box
@@ -13,7 +14,7 @@ from torch import Tensor
 from hyuav.errors import InputError
 from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
 from hyuav.figures import flight_map, learning_curves, save_figure, sum_rate_maps
-from hyuav.learning.checkpoint import load_checkpoint
+from hyuav.learning.checkpoint import load_weights_file
 from hyuav.learning.training import Training
 from hyuav.learning.weights import join_learners, load_weights, select_learner
 from hyuav.runs import RunConfiguration, RunDirectory
@@ -37,6 +38,7 @@ def train(
     *,
     device: str | None = None,
     initial_weights: dict[str, Tensor] | None = None,
+    request: Mapping[str, Any] | None = None,
 ) -> RunDirectory:
     """Train as configured, reporting to a new run directory.
 
@@ -47,6 +49,7 @@ def train(
         console: to show progress on.
         device: to train on.
         initial_weights: to begin with, instead of fresh ones.
+        request: all that was asked for, to be kept with the run.
 
     Raises:
         InputError: the directory is taken, or the checkpoint does not fit.
@@ -61,7 +64,7 @@ def train(
     )
     if initial_weights is not None:
         training.warm_start(initial_weights)
-    run = RunDirectory.create(directory, configuration)
+    run = RunDirectory.create(directory, configuration, request)
     with Tracker(run, configuration, training, logger, console) as tracker:
         for episode in training.episodes():
             tracker.log(episode)
@@ -76,8 +79,7 @@ def saved_weights(path: str | Path) -> dict[str, Tensor]:
     """
     path = Path(path)
     file = RunDirectory(path).best_checkpoint if path.is_dir() else path
-    weights: dict[str, Tensor] = load_checkpoint(file, "weights")
-    return weights
+    return load_weights_file(file)
 
 
 def select_initial_weights(
@@ -91,7 +93,7 @@ def select_initial_weights(
 
     The paper sets its initial weights so. Every scheme trains its candidates, and every learner
     begins with whichever candidate, of any scheme, earns most under the learner's own scheme.
-    They are judged without noise on fading of their own.
+    They are judged without noise, on fading that no later evaluation uses.
 
     Args:
         configuration: of the training to come; N is its number of learners.

@@ -1,6 +1,7 @@
 """The run directory: configuration, metrics, checkpoints, evaluation and figures of a training."""
 
 import csv
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from yaml import YAMLError
 
 from hyuav.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
-from hyuav.learning.checkpoint import load_checkpoint
+from hyuav.learning.checkpoint import load_weights_file
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import choice, count, sequence
 from hyuav.scenario import PRESETS, Scenario
@@ -81,6 +82,21 @@ class RunConfiguration:
 _schemes = sequence(choice(*SCHEMES), f"a list of {', '.join(SCHEMES)}")
 
 
+def require_writable(name: str, directory: Path) -> None:
+    """Accept a directory that can be written to; make it where there is none.
+
+    Raises:
+        InputError: it cannot be made or written to.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=directory):
+            pass
+    except OSError as error:
+        accepted = f"a writable place ({error.strerror})"
+        raise InputError(rejection(name, str(directory), accepted)) from None
+
+
 def mapping(name: str, value: object) -> dict[str, Any]:
     """Accept names with values."""
     if not isinstance(value, Mapping):
@@ -127,22 +143,31 @@ class RunDirectory:
         self.figures = self.path / "figures"
 
     @classmethod
-    def create(cls, path: str | Path, configuration: RunConfiguration) -> "RunDirectory":
+    def create(
+        cls,
+        path: str | Path,
+        configuration: RunConfiguration,
+        request: Mapping[str, Any] | None = None,
+    ) -> "RunDirectory":
         """Begin a run directory.
+
+        Args:
+            path: of the directory.
+            configuration: of the training.
+            request: all that was asked for beside it, kept in ``config.yaml`` too.
 
         Raises:
             InputError: another training's files are there, or the place cannot be written to.
         """
         run = cls(path)
-        if run.config_file.exists():
-            raise InputError(rejection("run directory", str(path), "one without a run in it"))
+        require_writable("run directory", run.figures)
+        content = OmegaConf.to_yaml({**(request or {}), **configuration.to_dict()})
         try:
-            run.figures.mkdir(parents=True, exist_ok=True)
-            OmegaConf.save(OmegaConf.create(configuration.to_dict()), run.config_file)
-        except OSError as error:
-            raise InputError(
-                rejection("run directory", str(path), f"a writable place ({error.strerror})")
-            ) from None
+            with run.config_file.open("x", encoding="utf-8") as file:
+                file.write(content)
+        except FileExistsError:
+            accepted = "one without a run in it"
+            raise InputError(rejection("run directory", str(path), accepted)) from None
         return run
 
     def configuration(self) -> RunConfiguration:
@@ -167,8 +192,7 @@ class RunDirectory:
         Raises:
             InputError: there is no such checkpoint, or it is truncated or foreign.
         """
-        weights: dict[str, Tensor] = load_checkpoint(self.best_checkpoint, "weights")
-        return weights
+        return load_weights_file(self.best_checkpoint)
 
     def metrics(self) -> pd.DataFrame:
         """What training brought, a row per episode and learner."""

@@ -31,6 +31,7 @@ PRESETS: dict[str, tuple[Point, ...]] = {
 """UE positions in metres of the two layouts that reproduce the paper's figures 3a and 3b."""
 
 _non_negative, _positive, _range = number(0.0), number(above=0.0), increasing_pair(0.0)
+_power, _gain, _noise = number(0.0, 1e6), number(0.0, 1e8), number(1e-24, 1e6)  # within float32
 _decibel = number(-100.0, 100.0)
 _point = sequence(number(), "two coordinates (x, y) in metres", length=2)
 _points = sequence(_point, "at least one pair of coordinates (x, y) in metres")
@@ -68,12 +69,12 @@ class Scenario(Parameters):
     speed_limit: str = parameter(choice("box", "disc"), "box")
     off_map_penalty: float = parameter(_non_negative, 0.2, symbol="r_om", unit="bps/Hz")
     helper_mass: float = parameter(_positive, 9.65, symbol="M", unit="kg")
-    ue_power: float = parameter(_non_negative, 0.1, symbol="p_u", unit="W")
-    jamming_power: float = parameter(_non_negative, 0.08, symbol="p_J", unit="W")
-    relay_power: float = parameter(_non_negative, 0.012, symbol="p_R", unit="W")
-    noise_power: float = parameter(_positive, 1e-13, symbol="sigma^2", unit="W")
-    ground_to_air_gain: float = parameter(_non_negative, 1e-5, symbol="beta_0")
-    air_to_air_gain: float = parameter(_non_negative, 1e-4, symbol="beta_1")
+    ue_power: float = parameter(_power, 0.1, symbol="p_u", unit="W")
+    jamming_power: float = parameter(_power, 0.08, symbol="p_J", unit="W")
+    relay_power: float = parameter(_power, 0.012, symbol="p_R", unit="W")
+    noise_power: float = parameter(_noise, 1e-13, symbol="sigma^2", unit="W")
+    ground_to_air_gain: float = parameter(_gain, 1e-5, symbol="beta_0")
+    air_to_air_gain: float = parameter(_gain, 1e-4, symbol="beta_1")
     ground_to_air_k_factor: float = parameter(_decibel, 12.0, symbol="K^G2A", unit="dB")
     air_to_air_k_factor: float = parameter(_decibel, 20.0, symbol="K^A2A", unit="dB")
     fading: bool = parameter(switch, True)

@@ -118,11 +118,6 @@ class Tracker:
         save_checkpoint(self.run.last_checkpoint, "training", self.training.state_dict())
         save_checkpoint(self.run.best_checkpoint, "weights", self.training.best_weights)
 
-    def log_summary(self, summary: dict[str, Any]) -> None:
-        """Keep final results, such as an evaluation's, with the Weights & Biases run."""
-        if self._wandb is not None:
-            self._wandb.experiment.summary.update(summary)
-
     def _rows(self, episode: Episode) -> list[dict[str, Any]]:
         seconds = round(time.perf_counter() - self._started, 3)
         columns: dict[str, list[float]] = {

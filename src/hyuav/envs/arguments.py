@@ -53,6 +53,8 @@ def as_device(device: torch.device | str | None) -> torch.device:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         accepted = f"a device of this machine, such as cpu or cuda ({reason})"
         raise InputError(rejection("device", device, accepted)) from None
+    if resolved.type == "meta":
+        raise InputError(rejection("device", device, "a device that holds numbers, such as cpu"))
     return resolved
 
 

@@ -13,6 +13,7 @@ from hyuav.envs.arguments import as_batch_size, as_device, as_scenario, as_schem
 from hyuav.envs.diagnostics import Slot, diagnose, diagnostics_spec
 from hyuav.errors import InputError, rejection
 from hyuav.model.offloading import prefers_relay
+from hyuav.parameters import switch
 from hyuav.scenario import Scenario
 from hyuav.system import SecureOffloadingSystem
 
@@ -74,7 +75,7 @@ class SecureOffloadingEnv(EnvBase):
         super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
         self.system = SecureOffloadingSystem(as_scenario(scenario), self.device)
         self.schemes = as_schemes(scheme, self.batch_size)
-        self.diagnostics = diagnostics
+        self.diagnostics = switch("diagnostics", diagnostics)
         self._always_relay = self._rows_that_fly("relay")
         self._always_jam = self._rows_that_fly("jamming")
         norm_limit = self.system.norm_limit(self.schemes)
@@ -169,7 +170,11 @@ class SecureOffloadingEnv(EnvBase):
         return position
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
-        flown = self.system.move(tensordict["position"], tensordict["action"], self._norm_limit)
+        position, action = tensordict["position"], tensordict["action"]
+        if action.shape != position.shape:
+            accepted = f"shape {tuple(position.shape)}"
+            raise InputError(rejection("action", tuple(action.shape), accepted))
+        flown = self.system.move(position, action, self._norm_limit)
         slot = self._slot(flown.position)
         after = self._observation(slot, flown.off_map.unsqueeze(-1))
         after["reward"] = torch.where(

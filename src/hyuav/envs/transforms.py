@@ -15,6 +15,7 @@ from torchrl.envs import (
 )
 
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
+from hyuav.parameters import switch
 from hyuav.scenario import Scenario
 
 
@@ -93,6 +94,7 @@ def make_env(
     Raises:
         InputError: as :class:`SecureOffloadingEnv`.
     """
+    switch("clock", clock)
     env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics)
     return TransformedEnv(
         env,

@@ -1,11 +1,10 @@
 """Checkpoint files: written whole or not at all, read without running code from them."""
 
-import pickle
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from hyuav.errors import InputError, rejection
 
@@ -38,7 +37,7 @@ def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "c
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})")) from None
-    except (RuntimeError, ValueError, EOFError, KeyError, pickle.PickleError, zipfile.BadZipFile):
+    except Exception:  # what unpickling raises on a foreign file is up to its bytes
         reason = "not a checkpoint, or truncated"
         raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})")) from None
     if not isinstance(stored, dict) or stored.get("format") != FORMAT:
@@ -47,3 +46,19 @@ def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "c
         reason = f"this one is of kind {stored.get('kind')!r}"
         raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})"))
     return stored["content"]
+
+
+def load_weights_file(path: str | Path) -> dict[str, Tensor]:
+    """Read the weights of networks, by name.
+
+    Raises:
+        InputError: as :func:`load_checkpoint`, or the weights are not finite.
+    """
+    weights = load_checkpoint(path, "weights")
+    by_name = isinstance(weights, dict) and all(
+        isinstance(values, Tensor) and values.is_floating_point() and bool(values.isfinite().all())
+        for values in weights.values()
+    )
+    if not by_name:
+        raise InputError(rejection("checkpoint", str(path), "finite weights by name"))
+    return weights

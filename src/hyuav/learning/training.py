@@ -10,12 +10,13 @@ from torch import Tensor
 from torchrl.collectors import Collector
 
 from hyuav.envs.transforms import make_env
-from hyuav.errors import InputError, rejection
+from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
+from hyuav.learning.compiled import CompiledUpdate, pays
 from hyuav.learning.randomness import RandomStream
 from hyuav.learning.replay import as_transition, make_replay
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
-from hyuav.parameters import Parameters, count, parameter, switch
+from hyuav.parameters import Parameters, choice, count, parameter, switch
 from hyuav.scenario import Scenario
 
 
@@ -29,6 +30,7 @@ class TrainingParameters(Parameters):
     evaluation_every: int = parameter(count(), 10, unit="episode")
     evaluation_episodes: int = parameter(count(), 100)
     clock: bool = parameter(switch, False)
+    compile: str = parameter(choice("auto", "always", "never"), "auto")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -67,6 +69,10 @@ class Training:
         parameters: how long and on what to learn.
         seed: of all random numbers.
         device: of all tensors.
+
+    Raises:
+        InputError: an unknown scheme or device, or a negative seed.
+        InputTypeError: an argument of the wrong type.
     """
 
     def __init__(
@@ -78,10 +84,14 @@ class Training:
         seed: int = 0,
         device: torch.device | str | None = None,
     ) -> None:
+        if isinstance(schemes, str) or not schemes:
+            raise InputTypeError(rejection("schemes", schemes, "a list with one for each learner"))
+        if not isinstance(algorithm, AlgorithmParameters):
+            raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
         learners, clock = len(schemes), parameters.clock
         self.scenario, self.schemes, self.parameters = scenario, tuple(schemes), parameters
         env = make_env(scenario, schemes, (learners,), device, seed, clock=clock)
-        self._evaluation_seed = seed + 1
+        self._evaluation_seed = (seed + 1) % 2**63
         observation_size = env.observation_spec["observation"].shape[-1]
         self._random = RandomStream(seed, env.device)
         with env.device, self._random.active():
@@ -99,6 +109,7 @@ class Training:
             auto_register_policy_transforms=False,
         )
         self._transitions = iter(self.collector)
+        self._compiled: CompiledUpdate | None = None
         self.slots = self.updates = 0
         self.best_evaluation = torch.full((learners,), -torch.inf, device=env.device)
         self.best_weights = copy_weights(self.algorithm.loss)
@@ -110,6 +121,7 @@ class Training:
 
     def episodes(self) -> Iterator[Episode]:
         """Train until ``num_episodes`` are flown; report each episode as it ends."""
+        self._compiled = CompiledUpdate(self.algorithm) if self._compiling_pays() else None
         while self.episode < self.parameters.num_episodes:
             with self._random.active():
                 episode = self._train_episode()
@@ -130,6 +142,12 @@ class Training:
             evaluation=self._keep_best() if self._evaluation_is_due() else None,
         )
 
+    def _compiling_pays(self) -> bool:
+        if self.parameters.compile != "auto":
+            return self.parameters.compile == "always"
+        slots = self.parameters.num_episodes * self.scenario.num_slots
+        return pays(slots - self.slots, len(self.schemes))
+
     def _learn(self, transition: TensorDictBase) -> dict[str, Tensor]:
         """Lines 12 to 15 of Algorithm 1; the collector has gone through lines 3 to 11."""
         self.replay.extend(transition.unsqueeze(0))
@@ -137,6 +155,8 @@ class Training:
             return {}
         batch = self.replay.sample()
         self.updates += 1
+        if self._compiled is not None:
+            return self._compiled(batch, self.updates)
         losses = self.algorithm.update_networks(batch, self.updates)
         self.algorithm.update_targets(self.updates)
         return losses

@@ -160,6 +160,8 @@ def solve_horizons(
     """
     scenario = as_scenario(scenario)
     schemes = (schemes,) if isinstance(schemes, str) else tuple(schemes)
+    if not isinstance(schemes, Sequence):
+        raise InputTypeError(rejection("schemes", schemes, f"a list of {', '.join(SCHEMES)}"))
     for scheme in schemes:
         require_choice("scheme", scheme, SCHEMES)
     scenarios = _with_horizons(scenario, horizons)

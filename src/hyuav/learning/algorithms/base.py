@@ -13,6 +13,8 @@ from torchrl.objectives import LossModule, SoftUpdate
 from hyuav.learning.networks import ACTIVATIONS
 from hyuav.parameters import Parameters, choice, count, number, parameter, sequence
 
+learning_rate = number(0.0, 1.0)
+
 
 @dataclass(frozen=True)
 class AlgorithmParameters(Parameters, ABC):
@@ -22,8 +24,8 @@ class AlgorithmParameters(Parameters, ABC):
         sequence(count(), "the sizes of at least one hidden layer"), (300, 100, 100)
     )
     activation: str = parameter(choice(*ACTIVATIONS), "tanh")
-    actor_learning_rate: float = parameter(number(above=0.0), 1e-4)
-    critic_learning_rate: float = parameter(number(above=0.0), 1e-4)
+    actor_learning_rate: float = parameter(learning_rate, 1e-4)
+    critic_learning_rate: float = parameter(learning_rate, 1e-4)
     discount: float = parameter(number(0.0, 1.0), 0.95, symbol="gamma")
     target_rate: float = parameter(number(0.0, 1.0), 0.005, symbol="tau")
 
@@ -63,6 +65,8 @@ class Algorithm:
     """Taken in this order in every update."""
     target: SoftUpdate
     """theta' <- tau theta + (1 - tau) theta'."""
+    target_rate: float
+    """tau."""
     target_every: int = 1
     """The targets follow in every n-th update."""
 

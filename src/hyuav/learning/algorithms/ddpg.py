@@ -15,7 +15,7 @@ from hyuav.parameters import choice, number, parameter
 class DDPG(AlgorithmParameters):
     """The paper's hyperparameters; the noise is in units of v_max."""
 
-    noise_variance: float = parameter(number(0.0), 0.6)
+    noise_variance: float = parameter(number(0.0, 1e6), 0.6)
     noise_decay: float = parameter(number(0.0, 1.0), 0.999)
     noise_decay_per: str = parameter(choice("slot", "episode"), "slot")
 
@@ -44,4 +44,5 @@ class DDPG(AlgorithmParameters):
                 GradientStep("actor", lambda batch: loss.loss_actor(batch)[0], actor_optimizer),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
+            target_rate=self.target_rate,
         )

@@ -11,12 +11,14 @@ from torch import Tensor, nn
 from torchrl.envs.utils import ExplorationType
 from torchrl.modules import ProbabilisticActor, TanhNormal
 from torchrl.objectives import SACLoss, SoftUpdate, ValueEstimators
+from torchrl.objectives.sac import compute_rsample_log_prob
 
 from hyuav.learning.algorithms.base import (
     Algorithm,
     AlgorithmParameters,
     GradientStep,
     adam,
+    learning_rate,
 )
 from hyuav.learning.networks import LearnerMLP, make_critic
 from hyuav.parameters import number, parameter
@@ -29,20 +31,23 @@ class LearnerSACLoss(SACLoss):
         super().__init__(*networks, alpha_init=alpha_init, **options)
         # (N, 1) broadcasts against the log-probabilities (N, K) of a mini-batch.
         self.log_alpha = nn.Parameter(torch.full((learners, 1), math.log(alpha_init)))
-        self._against_values = False
-
-    @property
-    def _alpha(self) -> Tensor:
-        alpha: Tensor = super()._alpha
-        return alpha.unsqueeze(-1) if self._against_values else alpha
 
     def _compute_target_v2(self, tensordict: TensorDictBase) -> Tensor:
-        # The target subtracts the temperature times the log-probability from values (N, K, 1).
-        self._against_values = True
-        try:
-            return super()._compute_target_v2(tensordict)
-        finally:
-            self._against_values = False
+        """The target (N, K), as TorchRL's but for the temperatures, which multiply (N, K) here."""
+        with torch.no_grad():
+            following = tensordict["next"].select(*self.actor_network.in_keys)
+            with self.actor_network_params.to_module(
+                self.actor_network, preserve_module_state=False
+            ):
+                distribution = self.actor_network.get_dist(following)
+            action, log_probability = compute_rsample_log_prob(distribution)
+            following["action"] = action
+            critics = self._vmap_qnetworkN0(following, self.target_qvalue_network_params)
+            value = critics["state_action_value"].min(dim=0).values
+            value = value - (self._alpha * log_probability).unsqueeze(-1)
+            tensordict = tensordict.clone(False)
+            tensordict["next", self.value_estimator.tensor_keys.value] = value
+            return self.value_estimator.value_estimate(tensordict).squeeze(-1)
 
     def actor_and_temperature_loss(self, batch: TensorDictBase) -> Tensor:
         """Both losses (N, K) from one sample of actions; neither's gradient reaches the other."""
@@ -54,9 +59,9 @@ class LearnerSACLoss(SACLoss):
 class SAC(AlgorithmParameters):
     """SAC's hyperparameters beside the common ones; the target entropy is minus dim(a)."""
 
-    temperature_learning_rate: float = parameter(number(above=0.0), 3e-4)
-    temperature_init: float = parameter(number(above=0.0), 0.2)
-    target_entropy: float = parameter(number(), -2.0)
+    temperature_learning_rate: float = parameter(learning_rate, 3e-4)
+    temperature_init: float = parameter(number(1e-6, 1e6), 0.2)
+    target_entropy: float = parameter(number(-100.0, 100.0), -2.0)
 
     def build(self, learners: int, observation_size: int) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
@@ -103,4 +108,5 @@ class SAC(AlgorithmParameters):
                 GradientStep("actor", loss.actor_and_temperature_loss, actor_optimizer),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
+            target_rate=self.target_rate,
         )

@@ -16,8 +16,8 @@ from hyuav.parameters import count, number, parameter
 class TD3(DDPG):
     """DDPG's hyperparameters and TD3's own three."""
 
-    target_noise_std: float = parameter(number(0.0), 0.2)
-    target_noise_clip: float = parameter(number(0.0), 0.5)
+    target_noise_std: float = parameter(number(0.0, 2.0), 0.2)
+    target_noise_clip: float = parameter(number(0.0, 2.0), 0.5)
     actor_every: int = parameter(count(), 2)
 
     def build(self, learners: int, observation_size: int) -> Algorithm:
@@ -52,5 +52,6 @@ class TD3(DDPG):
                 ),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
+            target_rate=self.target_rate,
             target_every=self.actor_every,
         )
