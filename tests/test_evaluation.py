@@ -8,7 +8,7 @@ import pytest
 import torch
 from scipy import stats
 
-from hyuav import Scenario
+from hyuav import InputError, Scenario
 from hyuav.evaluation import (
     LABELS,
     MODE_RULES,
@@ -124,3 +124,14 @@ def test_the_interval_of_a_flight_without_fading_is_its_value() -> None:
 def test_every_scheme_has_a_label_a_mode_rule_and_an_optimum() -> None:
     assert set(LABELS) == set(MODE_RULES)
     assert {OPTIMA[rule] for rule in MODE_RULES.values()} <= set(LABELS)
+
+
+def test_an_unknown_scheme_or_none_is_refused() -> None:
+    refused: list[dict[str, list[Policy]]] = [
+        {},
+        {"proposed": []},
+        {"foo": [Policy(re_lt(SCENARIO))]},
+    ]
+    for policies in refused:
+        with pytest.raises(InputError):
+            evaluate(SCENARIO, "two_clusters", policies, FEW)

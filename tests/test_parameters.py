@@ -29,8 +29,7 @@ from hyuav.parameters import (
 TWO_CLUSTERS = Scenario.preset("two_clusters")
 FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
 NON_NEGATIVE = (
-    *("ue_power", "jamming_power", "relay_power", "ground_to_air_gain", "air_to_air_gain"),
-    *("off_map_penalty", "min_secrecy_rate", "capacitance"),
+    *("coverage_radius", "off_map_penalty", "min_secrecy_rate", "capacitance"),
     *("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"),
 )
 
@@ -290,7 +289,10 @@ def test_a_wrong_value_in_a_file_is_named(tmp_path: Path, text: str, message: st
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("ue_positions: [[1, 2]]\nue_power: -1\n", "ue_power = -1: expected a finite number >= 0"),
+        (
+            "ue_positions: [[1, 2]]\nue_power: -1\n",
+            "ue_power = -1: expected a number in [0, 1e+06]",
+        ),
         ("ue_positions: [[1, 2]]\nue_powr: 1\n", "scenario: unknown field 'ue_powr'"),
         ("ue_power: 1\n", "scenario: ue_positions is missing"),
         ("[1, 2]\n", "expected fields with values"),

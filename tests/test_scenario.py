@@ -26,6 +26,11 @@ NON_NEGATIVE = (
     *("ground_to_air_gain", "air_to_air_gain", "min_secrecy_rate", "capacitance"),
     *("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"),
 )
+WITHIN_FLOAT32 = {
+    **dict.fromkeys(("ue_power", "jamming_power", "relay_power"), (0.0, 1e6)),
+    **dict.fromkeys(("ground_to_air_gain", "air_to_air_gain"), (0.0, 1e8)),
+    "noise_power": (1e-24, 1e6),
+}
 DECIBEL = ("ground_to_air_k_factor", "air_to_air_k_factor")
 NUMBERS = (*POSITIVE, *NON_NEGATIVE, *DECIBEL)
 POINTS = ("legitimate_position", "eavesdropper_position", "helper_start")
@@ -151,7 +156,8 @@ def test_no_length_power_or_energy_is_negative(name: str, value: float) -> None:
 
 @pytest.mark.parametrize("name", POSITIVE)
 def test_what_the_equations_divide_by_is_not_zero(name: str) -> None:
-    assert " > 0" in refused(name, 0.0)
+    accepted = "[1e-24, 1e+06]" if name == "noise_power" else " > 0"
+    assert accepted in refused(name, 0.0)
 
 
 @pytest.mark.parametrize("name", NON_NEGATIVE)
@@ -169,11 +175,22 @@ def test_a_k_factor_beyond_any_power_ratio_is_refused(name: str, size: float, si
     refused(name, sign * size)
 
 
+@pytest.mark.parametrize("name", sorted(WITHIN_FLOAT32))
+def test_ratios_of_powers_stay_within_float32(name: str) -> None:
+    low, high = WITHIN_FLOAT32[name]
+    assert with_value(name, low) == low
+    assert with_value(name, high) == high
+    for beyond in (high * 1.01, low * 0.99 if low else -1e-9):
+        assert "expected a number in [" in refused(name, beyond)
+
+
 @given(
     st.sampled_from([name for name in (*POSITIVE, *NON_NEGATIVE) if name != "map_side"]),
     st.floats(1e-30, 1e30),
 )
 def test_numbers_are_kept_as_they_are(name: str, value: float) -> None:
+    low, high = WITHIN_FLOAT32.get(name, (0.0, math.inf))
+    value = min(max(value, low), high)
     for number in (value, np.float64(value), torch.tensor(value, dtype=torch.float64)):
         kept = with_value(name, number)
         assert kept == value

@@ -4,9 +4,11 @@ from typing import Any
 
 import pytest
 import torch
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from hyuav.errors import InputError
-from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
+from hyuav.learning.checkpoint import load_checkpoint, load_weights_file, save_checkpoint
 
 
 def test_a_checkpoint_holds_tensors_and_plain_values(tmp_path: Path) -> None:
@@ -96,3 +98,20 @@ def test_loading_runs_no_code_from_a_checkpoint(tmp_path: Path) -> None:
     torch.save(_Command(marker), tmp_path / "hostile.pt")
     refusal(tmp_path / "hostile.pt")
     assert not marker.exists()
+
+
+@given(st.binary(max_size=300), st.sampled_from([b"", b"\x80\x02", b"PK\x03\x04", b"\x80\x04}q"]))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_bytes_end_in_a_traceback(tmp_path: Path, content: bytes, prefix: bytes) -> None:
+    file = tmp_path / "foreign.pt"
+    file.write_bytes(prefix + content)
+    refusal(file)
+
+
+@pytest.mark.parametrize(
+    "content", [3, [torch.zeros(2)], {"weight": 3}, {"weight": torch.tensor([1.0, torch.nan])}]
+)
+def test_what_is_not_finite_weights_is_refused(tmp_path: Path, content: Any) -> None:
+    save_checkpoint(tmp_path / "best.pt", "weights", content)
+    with pytest.raises(InputError, match=r"^checkpoint = .*: expected finite weights by name$"):
+        load_weights_file(tmp_path / "best.pt")

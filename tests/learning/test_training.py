@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from hyuav import Scenario
-from hyuav.errors import InputError
+from hyuav.errors import InputError, InputTypeError
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from hyuav.learning.randomness import RandomStream
@@ -129,3 +129,18 @@ def test_a_clock_lengthens_the_observation_by_one() -> None:
 def test_a_mini_batch_larger_than_the_replay_is_refused() -> None:
     with pytest.raises(InputError, match="batch_size = 30: expected at most replay_size = 20"):
         TrainingParameters(replay_size=20, batch_size=30)
+
+
+def test_schemes_are_a_list_and_the_algorithm_is_a_record() -> None:
+    with pytest.raises(InputTypeError, match="schemes = 'hybrid'"):
+        Training(SCENARIO, "hybrid", ALGORITHMS["ddpg"](), SHORT)
+    with pytest.raises(InputTypeError, match="algorithm = 'ddpg'"):
+        Training(SCENARIO, ["hybrid"], "ddpg", SHORT)  # type: ignore[arg-type]
+
+
+def test_a_training_that_compiles_agrees_with_an_eager_one() -> None:
+    eager, compiled = (training(compile=choice) for choice in ("never", "always"))
+    for one, two in zip(eager.episodes(), compiled.episodes(), strict=True):
+        torch.testing.assert_close(
+            one.accumulated_reward, two.accumulated_reward, rtol=1e-3, atol=1e-3
+        )
