@@ -7,6 +7,7 @@ eager path, so a training may change over at any time and a checkpoint serves bo
 
 import os
 import shutil
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -66,7 +67,9 @@ class CompiledUpdate:
         )
         if taken not in self._graphs:
             self._graphs[taken] = self._compile(taken)
-        return self._graphs[taken](batch)
+        with torch._dynamo.config.patch(trace_autograd_ops=True), warnings.catch_warnings():
+            warnings.simplefilter("ignore", FutureWarning)  # of settings that tensordict reads
+            return self._graphs[taken](batch)
 
     def _compile(self, taken: tuple[bool, ...]) -> Callable[[TensorDictBase], Losses]:
         steps = [step for step, due in zip(self.algorithm.steps, taken[:-1], strict=True) if due]
@@ -85,13 +88,7 @@ class CompiledUpdate:
             return losses
 
         options: dict[str, Any] = {"cpp.use_decompose_tanh": True, "fallback_random": True}
-        graph = torch.compile(update, fullgraph=True, dynamic=False, options=options)
-
-        def call(batch: TensorDictBase) -> Losses:
-            with torch._dynamo.config.patch(trace_autograd_ops=True):
-                return graph(batch)
-
-        return call
+        return torch.compile(update, fullgraph=True, dynamic=False, options=options)
 
 
 class _AdamState:
