@@ -7,7 +7,15 @@ import pytest
 import torch
 
 from hyuav import InputError, Scenario, make_env
-from hyuav.schemes.optimum import FlightPolicy, Optimum, _flyable, solve, solve_horizons
+from hyuav.scenario import PRESETS
+from hyuav.schemes.optimum import (
+    RESOLUTION,
+    FlightPolicy,
+    Optimum,
+    _flyable,
+    solve,
+    solve_horizons,
+)
 from hyuav.system import SCHEMES, SecureOffloadingSystem
 
 REFERENCE = {
@@ -261,3 +269,18 @@ def test_bad_input_is_answered_in_one_line(arguments: dict[str, Any], field: str
 def test_horizons_are_whole_numbers_of_slots(horizons: Any) -> None:
     with pytest.raises(InputError):
         solve_horizons("two_clusters", horizons)
+
+
+@pytest.mark.parametrize("name", sorted(PRESETS))
+@pytest.mark.parametrize("fading", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_halving_the_default_resolution_moves_no_value_by_two_parts_in_a_thousand(
+    name: str, fading: bool
+) -> None:
+    scenario = dataclasses.replace(Scenario.preset(name), fading=fading)
+    coarse, fine = (
+        solve_horizons(scenario, [10, 20], resolution=resolution)
+        for resolution in (RESOLUTION, RESOLUTION / 2)
+    )
+    for scheme, optima in coarse.items():
+        for horizon, optimum in optima.items():
+            assert fine[scheme][horizon].value == pytest.approx(optimum.value, rel=0.002)
