@@ -64,12 +64,8 @@ def diagnose(
         edge_load: (..., 1) cycles that the edge server took in the previous slot.
     """
     assert slot.tasks is not None
-    relay_mode, relay, jamming, cpu_cycles = (
-        slot.relay_mode,
-        slot.relay,
-        slot.jamming,
-        slot.tasks.cpu_cycles,
-    )
+    relay_mode, relay, jamming = slot.relay_mode, slot.relay, slot.jamming
+    cpu_cycles = slot.tasks.cpu_cycles
     scenario = system.scenario
     duration, num_ues = scenario.slot_duration, scenario.num_ues
     offloading = torch.where(relay_mode, relay.offloading, jamming.offloading)
