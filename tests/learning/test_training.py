@@ -7,6 +7,7 @@ import torch
 
 from hyuav import Scenario
 from hyuav.errors import InputError, InputTypeError
+from hyuav.learning import compiled
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from hyuav.learning.randomness import RandomStream
@@ -139,8 +140,26 @@ def test_schemes_are_a_list_and_the_algorithm_is_a_record() -> None:
 
 
 def test_a_training_that_compiles_agrees_with_an_eager_one() -> None:
-    eager, compiled = (training(compile=choice) for choice in ("never", "always"))
-    for one, two in zip(eager.episodes(), compiled.episodes(), strict=True):
+    eager, graph = (training(compile=choice) for choice in ("never", "always"))
+    for one, two in zip(eager.episodes(), graph.episodes(), strict=True):
         torch.testing.assert_close(
             one.accumulated_reward, two.accumulated_reward, rtol=1e-3, atol=1e-3
         )
+
+
+def test_where_the_compiler_fails_training_goes_on_without_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    broken = tmp_path / "g++"
+    broken.write_text("#!/bin/sh\necho 'fatal error: Python.h: No such file' >&2\nexit 1\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("TORCHINDUCTOR_CACHE_DIR", str(tmp_path / "empty-cache"))
+    monkeypatch.setattr(torch._inductor.config.cpp, "cxx", (str(broken),))
+    monkeypatch.setattr(compiled, "COMPILE_SECONDS", 0.0)
+    torch._dynamo.reset()
+    plain, other = training(compile="never"), training(compile="auto")
+    expected = list(plain.episodes())
+    with pytest.warns(UserWarning, match="training goes on without compiling"):
+        episodes = list(other.episodes())
+    for one, two in zip(expected, episodes, strict=True):
+        assert torch.equal(one.accumulated_reward, two.accumulated_reward)

@@ -14,6 +14,8 @@ from typing import Any
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor
+from torch._dynamo.exc import BackendCompilerFailed
+from torch._inductor.exc import InductorError
 
 from hyuav.learning.algorithms import Algorithm, GradientStep
 
@@ -22,6 +24,9 @@ COMPILE_SECONDS = 40.0
 
 SECONDS_SAVED = (0.004, 0.0013)
 """Saved per update, and besides that per learner and update, on two cores."""
+
+COMPILATION_ERRORS = (BackendCompilerFailed, InductorError)
+"""What the first call raises where the graph cannot be compiled, as without Python's headers."""
 
 Losses = dict[str, Tensor]
 

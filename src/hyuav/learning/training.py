@@ -1,5 +1,6 @@
 """The training loop: Algorithm 1, for any algorithm and for many learners side by side."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,7 @@ from torchrl.collectors import Collector
 from hyuav.envs.transforms import make_env
 from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.compiled import CompiledUpdate, pays
+from hyuav.learning.compiled import COMPILATION_ERRORS, CompiledUpdate, pays
 from hyuav.learning.randomness import RandomStream
 from hyuav.learning.replay import as_transition, make_replay
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
@@ -155,11 +156,24 @@ class Training:
             return {}
         batch = self.replay.sample()
         self.updates += 1
-        if self._compiled is not None:
-            return self._compiled(batch, self.updates)
+        if self._compiled is not None and (done := self._update_compiled(batch)) is not None:
+            return done
         losses = self.algorithm.update_networks(batch, self.updates)
         self.algorithm.update_targets(self.updates)
         return losses
+
+    def _update_compiled(self, batch: TensorDictBase) -> dict[str, Tensor] | None:
+        """Lines 14 and 15 as one graph; None where this machine cannot compile it."""
+        assert self._compiled is not None
+        try:
+            return self._compiled(batch, self.updates)
+        except COMPILATION_ERRORS as error:  # before any weight has changed
+            if self.parameters.compile == "always":
+                raise
+            reason = " ".join(str(error).split())[:200]
+            warnings.warn(f"training goes on without compiling ({reason})", stacklevel=2)
+            self._compiled = None
+            return None
 
     def _evaluation_is_due(self) -> bool:
         last = self.episode == self.parameters.num_episodes
