@@ -86,6 +86,8 @@ class SecureOffloadingSystem:
             ue_to_legitimate, scenario.coverage_radius
         )
         self._allowed_to_jam = jamming_coverage & self._ue_can_pay(relay=False)
+        self.edge_can_saturate = self._largest_load_exceeds_budget()
+        """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
 
     def _tensor(self, values: object) -> Tensor:
         return torch.tensor(values, dtype=self.dtype, device=self.device)
@@ -98,9 +100,7 @@ class SecureOffloadingSystem:
         )
         return spent <= scenario.ue_energy_budget
 
-    @property
-    def edge_can_saturate(self) -> bool:
-        """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
+    def _largest_load_exceeds_budget(self) -> bool:
         scenario = self.scenario
         frequency = (
             scenario.num_ues * scenario.task_size[1] * scenario.cycles_per_bit[1]

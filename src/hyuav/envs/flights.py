@@ -39,7 +39,7 @@ class Flights:
         self.env = env
         self._state: TensorDictBase | None = None
         self.scenario: Scenario = env.base_env.scenario
-        self.recorder = FlightRecorder(self.scenario)
+        self._recorder = None if render_mode is None else FlightRecorder(self.scenario)
 
     @property
     def state(self) -> TensorDictBase:
@@ -73,7 +73,8 @@ class Flights:
             entries = self.state.copy()
             entries["position"] = torch.where(rows, start, entries["position"])
             entries["_reset"] = rows
-            self.recorder.drop_last()
+            if self._recorder is not None:
+                self._recorder.drop_last()
         self._enter(self.env.reset(entries))
 
     def step(self, action: ArrayLike) -> tuple[Floats, Floats, Flags]:
@@ -102,12 +103,14 @@ class Flights:
         }
 
     def frame(self, row: tuple[int, ...] = ()) -> NDArray[np.uint8]:
-        """A picture of one row's flight up to now."""
-        return self.recorder.frame(int(self.state["step_count"][row]), row)
+        """A picture of one row's flight up to now; needs a render mode."""
+        assert self._recorder is not None
+        return self._recorder.frame(int(self.state["step_count"][row]), row)
 
     def _enter(self, state: TensorDictBase) -> None:
         self._state = state
-        self.recorder.add(state["position"].numpy(force=True), _column(state["mode"]))
+        if self._recorder is not None:
+            self._recorder.add(state["position"].numpy(force=True), _column(state["mode"]))
 
 
 def accepted_options(options: object, names: Sequence[str]) -> Mapping[str, Any]:
