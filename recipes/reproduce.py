@@ -22,7 +22,8 @@ from hyuav.experiment import (
 )
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import Parameters, count, parameter, text
-from hyuav.runs import RunConfiguration, named_algorithm, named_scenario
+from hyuav.runs import RunConfiguration
+from hyuav.system import SCHEMES
 from hyuav.tracking import LoggerParameters
 
 
@@ -55,17 +56,9 @@ def main(config: Config, directory: Path) -> None:
     torch.set_num_threads(options.threads)
     parameters = EvaluationParameters.from_dict(config["evaluation"])
     logger = LoggerParameters.from_dict(config["logger"])
-    scenario_name, scenario = named_scenario(config["scenario"])
-    algorithm_name, algorithm = named_algorithm(config["algorithm"])
-    configuration = RunConfiguration(
-        scenario_name,
-        scenario,
-        tuple(scheme for scheme in ("hybrid", "relay", "jamming") for _ in range(options.seeds)),
-        algorithm_name,
-        algorithm,
-        TrainingParameters.from_dict(config["training"]),
-        options.seed,
-    )
+    schemes = [scheme for scheme in SCHEMES for _ in range(options.seeds)]
+    configuration = RunConfiguration.from_dict({**config, "schemes": schemes})
+    scenario = configuration.scenario
     console = Console()
     references = reference_policies(scenario, parameters.resolution, console)
     initial_weights = None
@@ -91,7 +84,9 @@ def main(config: Config, directory: Path) -> None:
         request=config,
     )
     policies = {**learned_policies([run], scenario), **references}
-    evaluation = evaluate(scenario, scenario_name, policies, parameters, options.device)
+    evaluation = evaluate(
+        scenario, configuration.scenario_name, policies, parameters, options.device
+    )
     evaluation.save(run.path)
     draw_figures(run.figures, scenario, evaluation, run.metrics())
     print_results(evaluation, console)

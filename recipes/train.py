@@ -13,7 +13,7 @@ from hyuav.configuration import Config, recipe, section
 from hyuav.experiment import saved_weights, train
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import Parameters, choice, count, optional, parameter, text
-from hyuav.runs import RunConfiguration, named_algorithm, named_scenario
+from hyuav.runs import RunConfiguration
 from hyuav.system import SCHEMES
 from hyuav.tracking import LoggerParameters
 
@@ -42,17 +42,8 @@ def main(config: Config, directory: Path) -> None:
     """Train, and say where the run is."""
     options = section(config, Train)
     torch.set_num_threads(options.threads)
-    scenario_name, scenario = named_scenario(config["scenario"])
-    algorithm_name, algorithm = named_algorithm(config["algorithm"])
-    configuration = RunConfiguration(
-        scenario_name,
-        scenario,
-        (options.scheme,) * options.learners,
-        algorithm_name,
-        algorithm,
-        TrainingParameters.from_dict(config["training"]),
-        options.seed,
-    )
+    schemes = [options.scheme] * options.learners
+    configuration = RunConfiguration.from_dict({**config, "schemes": schemes})
     console = Console()
     run = train(
         directory,

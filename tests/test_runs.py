@@ -44,7 +44,16 @@ def test_a_run_in_the_place_of_a_file_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "content",
-    [None, "", "- 1", "seed: 3", "a: [", "scenario: {name: x}\nschemes: [hybrid]", "\x00\xff"],
+    [
+        None,
+        "",
+        "- 1",
+        "seed: 3",
+        "a: [",
+        "seed: !!int many",
+        "scenario: {name: x}\nschemes: [hybrid]",
+        "\x00\xff",
+    ],
 )
 def test_a_directory_that_is_no_run_is_refused_in_one_line(
     tmp_path: Path, content: str | None

@@ -93,7 +93,7 @@ def select_initial_weights(
 
     The paper sets its initial weights so. Every scheme trains its candidates, and every learner
     begins with whichever candidate, of any scheme, earns most under the learner's own scheme.
-    They are judged without noise, on fading that no later evaluation uses.
+    They are judged as best weights are, without noise and on the training's evaluation fading.
 
     Args:
         configuration: of the training to come; N is its number of learners.

@@ -163,6 +163,22 @@ def refuse_unknown(owner: str, names: Iterable[str], known: Iterable[str]) -> No
             raise InputError(f"{owner}: unknown field {name!r}: {hint}")
 
 
+def read_yaml(path: str | Path) -> dict[str, Any]:
+    """Read names with values from a YAML file; nothing in it is run or looked up.
+
+    Raises:
+        InputError: no such file, not YAML, or not names with values; the message is the reason.
+    """
+    try:
+        values = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
+    except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"cannot be read ({reason})") from None
+    if not isinstance(values, dict):
+        raise InputError("expected fields with values")
+    return {str(name): value for name, value in values.items()}
+
+
 @dataclass(frozen=True)
 class Parameters:
     """A record whose fields, declared with :func:`parameter`, are checked on creation.
@@ -209,18 +225,10 @@ class Parameters:
         Raises:
             InputError: no such file, not YAML, or not such a record.
         """
-        file = f"{cls.__name__.lower()} file {str(path)!r}"
         try:
-            values = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
-        except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
-            reason = " ".join(str(error).split())
-            raise InputError(f"{file}: cannot be read ({reason})") from None
-        if not isinstance(values, dict):
-            raise InputError(f"{file}: expected fields with values")
-        try:
-            return cls.from_dict({str(name): value for name, value in values.items()})
+            return cls.from_dict(read_yaml(path))
         except InputError as error:
-            raise InputError(f"{file}: {error}") from None
+            raise InputError(f"{cls.__name__.lower()} file {str(path)!r}: {error}") from None
 
 
 def _as_lists(value: Any) -> Any:

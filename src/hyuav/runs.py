@@ -9,15 +9,13 @@ from typing import Any
 
 import pandas as pd
 from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 from torch import Tensor
-from yaml import YAMLError
 
 from hyuav.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file
 from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import choice, count, sequence
+from hyuav.parameters import choice, count, read_yaml, sequence
 from hyuav.scenario import PRESETS, Scenario
 from hyuav.system import SCHEMES
 
@@ -177,14 +175,11 @@ class RunDirectory:
             InputError: there is no run here, or its ``config.yaml`` is not one.
         """
         try:
-            values = OmegaConf.to_container(OmegaConf.load(self.config_file), resolve=False)
-        except (OSError, YAMLError, OmegaConfBaseException, UnicodeDecodeError) as error:
-            reason = " ".join(str(error).split())
-            accepted = f"a run directory with a config.yaml ({reason})"
+            values = read_yaml(self.config_file)
+        except InputError as error:
+            accepted = f"a run directory with a config.yaml ({error})"
             raise InputError(rejection("run", str(self.path), accepted)) from None
-        if not isinstance(values, dict):
-            raise InputError(rejection("run", str(self.path), "a run directory with a config.yaml"))
-        return RunConfiguration.from_dict({str(name): value for name, value in values.items()})
+        return RunConfiguration.from_dict(values)
 
     def best_weights(self) -> dict[str, Tensor]:
         """The best weights so far of all learners.

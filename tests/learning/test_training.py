@@ -154,12 +154,14 @@ def test_where_the_compiler_fails_training_goes_on_without_it(
     broken.write_text("#!/bin/sh\necho 'fatal error: Python.h: No such file' >&2\nexit 1\n")
     broken.chmod(0o755)
     monkeypatch.setenv("TORCHINDUCTOR_CACHE_DIR", str(tmp_path / "empty-cache"))
-    monkeypatch.setattr(torch._inductor.config.cpp, "cxx", (str(broken),))
     monkeypatch.setattr(compiled, "COMPILE_SECONDS", 0.0)
     torch._dynamo.reset()
     plain, other = training(compile="never"), training(compile="auto")
     expected = list(plain.episodes())
-    with pytest.warns(UserWarning, match="training goes on without compiling"):
+    with (
+        torch._inductor.config.patch({"cpp.cxx": (str(broken),)}),
+        pytest.warns(UserWarning, match="training goes on without compiling"),
+    ):
         episodes = list(other.episodes())
     for one, two in zip(expected, episodes, strict=True):
         assert torch.equal(one.accumulated_reward, two.accumulated_reward)

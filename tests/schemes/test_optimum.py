@@ -284,3 +284,9 @@ def test_halving_the_default_resolution_moves_no_value_by_two_parts_in_a_thousan
     for scheme, optima in coarse.items():
         for horizon, optimum in optima.items():
             assert fine[scheme][horizon].value == pytest.approx(optimum.value, rel=0.002)
+
+
+@pytest.mark.parametrize("schemes", [3, None, {"hybrid"}, []])
+def test_schemes_are_a_name_or_a_list_of_names(schemes: Any) -> None:
+    with pytest.raises(InputError, match=r"^schemes[^\n]*expected[^\n]*hybrid"):
+        solve(without_fading(), schemes, resolution=10.0)

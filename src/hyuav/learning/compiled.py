@@ -79,7 +79,7 @@ class CompiledUpdate:
     def _compile(self, taken: tuple[bool, ...]) -> Callable[[TensorDictBase], Losses]:
         steps = [step for step, due in zip(self.algorithm.steps, taken[:-1], strict=True) if due]
         targets = self._targets if taken[-1] else []
-        rate = self.algorithm.target_rate
+        rate = 1.0 - self.algorithm.target.eps  # tau
 
         def update(batch: TensorDictBase) -> Losses:
             losses = {}

@@ -156,24 +156,22 @@ class Training:
             return {}
         batch = self.replay.sample()
         self.updates += 1
-        if self._compiled is not None and (done := self._update_compiled(batch)) is not None:
-            return done
+        return self._update(batch)
+
+    def _update(self, batch: TensorDictBase) -> dict[str, Tensor]:
+        """Lines 14 and 15, as one graph where it is compiled and can be."""
+        if self._compiled is not None:
+            try:
+                return self._compiled(batch, self.updates)
+            except COMPILATION_ERRORS as error:  # before any weight has changed
+                if self.parameters.compile == "always":
+                    raise
+                reason = " ".join(str(error).split())[:200]
+                warnings.warn(f"training goes on without compiling ({reason})", stacklevel=2)
+                self._compiled = None
         losses = self.algorithm.update_networks(batch, self.updates)
         self.algorithm.update_targets(self.updates)
         return losses
-
-    def _update_compiled(self, batch: TensorDictBase) -> dict[str, Tensor] | None:
-        """Lines 14 and 15 as one graph; None where this machine cannot compile it."""
-        assert self._compiled is not None
-        try:
-            return self._compiled(batch, self.updates)
-        except COMPILATION_ERRORS as error:  # before any weight has changed
-            if self.parameters.compile == "always":
-                raise
-            reason = " ".join(str(error).split())[:200]
-            warnings.warn(f"training goes on without compiling ({reason})", stacklevel=2)
-            self._compiled = None
-            return None
 
     def _evaluation_is_due(self) -> bool:
         last = self.episode == self.parameters.num_episodes

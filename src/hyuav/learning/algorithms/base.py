@@ -65,8 +65,6 @@ class Algorithm:
     """Taken in this order in every update."""
     target: SoftUpdate
     """theta' <- tau theta + (1 - tau) theta'."""
-    target_rate: float
-    """tau."""
     target_every: int = 1
     """The targets follow in every n-th update."""
 

@@ -44,5 +44,4 @@ class DDPG(AlgorithmParameters):
                 GradientStep("actor", lambda batch: loss.loss_actor(batch)[0], actor_optimizer),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
-            target_rate=self.target_rate,
         )

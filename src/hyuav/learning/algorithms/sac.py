@@ -108,5 +108,4 @@ class SAC(AlgorithmParameters):
                 GradientStep("actor", loss.actor_and_temperature_loss, actor_optimizer),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
-            target_rate=self.target_rate,
         )

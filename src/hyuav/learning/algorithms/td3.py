@@ -52,6 +52,5 @@ class TD3(DDPG):
                 ),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
-            target_rate=self.target_rate,
             target_every=self.actor_every,
         )
