@@ -349,7 +349,7 @@ def fly(env: Any, state: Any, action: Any) -> Any:
 
 def next_draws(env: Any) -> tuple[list[list[float] | None], list[list[float]]]:
     """The fading powers and CPU cycles, by row, that the environment is about to draw."""
-    state = env.random_state()
+    state = env.draws.state()
     fading_rng, task_rng = torch.Generator(), torch.Generator()
     fading_rng.set_state(state["fading"])
     task_rng.set_state(state["tasks"])

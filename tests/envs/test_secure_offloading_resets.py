@@ -122,10 +122,10 @@ def test_without_a_seed_the_global_seed_decides() -> None:
 def test_the_random_numbers_continue_from_a_saved_state() -> None:
     env = SecureOffloadingEnv(RANDOM_DISK, "jamming", seed=0, diagnostics=True)
     state = fly(env, start_at(env, [80.0, 80.0]), [0.0, 0.0])
-    saved = env.random_state()
+    saved = env.draws.state()
     expected = fly(env, state, [0.1, 0.1])
     other = SecureOffloadingEnv(RANDOM_DISK, "jamming", seed=123, diagnostics=True)
-    other.set_random_state(saved)
+    other.draws.set_state(saved)
     assert_same(fly(other, state, [0.1, 0.1]), expected)
 
 
@@ -143,5 +143,5 @@ def test_any_whole_number_is_a_seed(seed: Any) -> None:
 
 @given(SEEDS)
 def test_the_tasks_do_not_follow_the_fading(seed: int) -> None:
-    state = SecureOffloadingEnv(TWO_CLUSTERS, seed=seed).random_state()
+    state = SecureOffloadingEnv(TWO_CLUSTERS, seed=seed).draws.state()
     assert not torch.equal(state["fading"], state["tasks"])

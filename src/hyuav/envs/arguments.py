@@ -72,3 +72,11 @@ def as_seed(seed: int | None) -> int:
     if not 0 <= number < 2**63:
         raise InputError(rejection("seed", seed, accepted))
     return number
+
+
+def as_seeds(seeds: Sequence[int], batch_size: torch.Size) -> tuple[int, ...]:
+    """One seed for each row of the batch's first dimension."""
+    rows = batch_size[0] if batch_size else 0
+    if len(seeds) != rows:
+        raise InputError(rejection("seed", seeds, f"one number, or one for each of {rows} rows"))
+    return tuple(as_seed(seed) for seed in seeds)

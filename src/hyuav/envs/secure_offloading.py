@@ -9,8 +9,16 @@ from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from hyuav.envs.arguments import as_batch_size, as_device, as_scenario, as_schemes, as_seed
+from hyuav.envs.arguments import (
+    as_batch_size,
+    as_device,
+    as_scenario,
+    as_schemes,
+    as_seed,
+    as_seeds,
+)
 from hyuav.envs.diagnostics import Slot, diagnose, diagnostics_spec
+from hyuav.envs.draws import BatchDraws, Draws, RowDraws
 from hyuav.errors import InputError, rejection
 from hyuav.model.offloading import prefers_relay
 from hyuav.parameters import switch
@@ -50,7 +58,8 @@ class SecureOffloadingEnv(EnvBase):
         batch_size: of the helpers flown at once.
         device: of all tensors.
         seed: of the fading and the tasks; the same seed gives the same episode, whether or not
-            diagnostics are asked for.
+            diagnostics are asked for. Or one for each row of the batch's first dimension, whose
+            numbers then depend on its own seed alone: rows of equal seeds are equally lucky.
         diagnostics: compute the ``diagnostics`` entry too.
 
     Raises:
@@ -69,7 +78,7 @@ class SecureOffloadingEnv(EnvBase):
         scheme: str | Sequence[str] = "hybrid",
         batch_size: int | Sequence[int] = (),
         device: torch.device | str | None = None,
-        seed: int | None = None,
+        seed: int | Sequence[int] | None = None,
         diagnostics: bool = False,
     ) -> None:
         super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
@@ -81,9 +90,11 @@ class SecureOffloadingEnv(EnvBase):
         norm_limit = self.system.norm_limit(self.schemes)
         self._norm_limit = None if norm_limit is None else self._per_row(norm_limit)
         self._make_specs()
-        self._fading_rng = torch.Generator(self.system.device)
-        self._task_rng = torch.Generator(self.system.device)
-        self.set_seed(as_seed(seed))
+        self.draws: Draws
+        if isinstance(seed, list | tuple):
+            self.draws = RowDraws(self.system, self.batch_size, as_seeds(seed, self.batch_size))
+        else:
+            self.set_seed(as_seed(seed))
 
     @property
     def scenario(self) -> Scenario:
@@ -132,19 +143,7 @@ class SecureOffloadingEnv(EnvBase):
         )
 
     def _set_seed(self, seed: int | None) -> None:
-        root = torch.Generator().manual_seed(as_seed(seed))
-        fading_seed, task_seed = torch.randint(2**62, (2,), generator=root).tolist()
-        self._fading_rng.manual_seed(fading_seed)
-        self._task_rng.manual_seed(task_seed)
-
-    def random_state(self) -> dict[str, Tensor]:
-        """The state of the random numbers, as :meth:`set_random_state` takes it."""
-        return {"fading": self._fading_rng.get_state(), "tasks": self._task_rng.get_state()}
-
-    def set_random_state(self, state: dict[str, Tensor]) -> None:
-        """Continue the random numbers where :meth:`random_state` was taken."""
-        self._fading_rng.set_state(state["fading"])
-        self._task_rng.set_state(state["tasks"])
+        self.draws = BatchDraws(self.system, self.batch_size, as_seed(seed))
 
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
         position = None if tensordict is None else tensordict.get("position", None)
@@ -191,10 +190,10 @@ class SecureOffloadingEnv(EnvBase):
 
     def _slot(self, position: Tensor) -> Slot:
         """Lines 6 to 11 of Algorithm 1 with the helper at ``position`` (*batch_size, 2) m."""
-        fading = self.system.draw_fading(self.batch_size, self._fading_rng)
+        fading = self.draws.fading()
         tasks = None
         if self.diagnostics or self.system.edge_can_saturate:
-            tasks = self.system.draw_tasks(self.batch_size, self._task_rng)
+            tasks = self.draws.tasks()
         distances = self.system.distances(position)
         gains = self.system.channel_gains(distances, fading)
         admission = tasks if self.system.edge_can_saturate else None

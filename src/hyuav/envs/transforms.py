@@ -70,7 +70,7 @@ def make_env(
     scheme: str | Sequence[str] = "hybrid",
     batch_size: int | Sequence[int] = (),
     device: torch.device | str | None = None,
-    seed: int | None = None,
+    seed: int | Sequence[int] | None = None,
     diagnostics: bool = False,
     *,
     clock: bool = False,
@@ -87,7 +87,7 @@ def make_env(
         scheme: who chooses the helper's mode.
         batch_size: of the helpers flown at once.
         device: of all tensors.
-        seed: of fading and tasks.
+        seed: of fading and tasks, one for all or one per row.
         diagnostics: compute the ``diagnostics`` entry too.
         clock: append the slots flown to ``observation``, which then has U + 6 entries.
 

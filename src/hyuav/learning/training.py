@@ -230,7 +230,7 @@ class Training:
             "optimizers": [step.optimizer.state_dict() for step in self.algorithm.steps],
             "replay": self.replay.state_dict(),
             "slot": self.collector._carrier.to_dict(),  # where the flight stands
-            "environment": self.collector.env.base_env.random_state(),
+            "environment": self.collector.env.base_env.draws.state(),
             "random": self._random.state,
             "slots": self.slots,
             "updates": self.updates,
@@ -250,7 +250,7 @@ class Training:
                 step.optimizer.load_state_dict(optimizer)
             self.replay.load_state_dict(state["replay"])
             self.collector._carrier.update(state["slot"])
-            self.collector.env.base_env.set_random_state(state["environment"])
+            self.collector.env.base_env.draws.set_state(state["environment"])
             self._random.state = state["random"]
             self.slots, self.updates = state["slots"], state["updates"]
             self.best_evaluation = state["best_evaluation"]
