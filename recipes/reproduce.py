@@ -20,6 +20,7 @@ from hyuav.experiment import (
     select_initial_weights,
     train,
 )
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import Parameters, count, parameter, text
 from hyuav.runs import RunConfiguration
@@ -56,8 +57,9 @@ def main(config: Config, directory: Path) -> None:
     torch.set_num_threads(options.threads)
     parameters = EvaluationParameters.from_dict(config["evaluation"])
     logger = LoggerParameters.from_dict(config["logger"])
-    schemes = [scheme for scheme in SCHEMES for _ in range(options.seeds)]
-    configuration = RunConfiguration.from_dict({**config, "schemes": schemes})
+    seeds = range(options.seed, options.seed + options.seeds)
+    learners = [Learner(scheme, seed) for scheme in SCHEMES for seed in seeds]
+    configuration = RunConfiguration.from_dict({**config, "learners": learners})
     scenario = configuration.scenario
     console = Console()
     references = reference_policies(scenario, parameters.resolution, console)

@@ -1,6 +1,7 @@
 """Train learners and keep the run.
 
 python recipes/train.py scenario=two_clusters scheme=hybrid algorithm=ddpg seed=0
+python recipes/train.py scheme=[hybrid,relay,jamming] num_slots=[10,20] learners=10
 """
 
 from dataclasses import dataclass
@@ -11,8 +12,9 @@ from rich.console import Console
 
 from hyuav.configuration import Config, recipe, section
 from hyuav.experiment import saved_weights, train
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import Parameters, choice, count, optional, parameter, text
+from hyuav.parameters import Parameters, choice, count, one_or_more, optional, parameter, text
 from hyuav.runs import RunConfiguration
 from hyuav.system import SCHEMES
 from hyuav.tracking import LoggerParameters
@@ -22,8 +24,12 @@ from hyuav.tracking import LoggerParameters
 class Train(Parameters):
     """What to train, besides the scenario, the algorithm and its training."""
 
-    scheme: str = parameter(choice(*SCHEMES), "hybrid")
+    scheme: tuple[str, ...] = parameter(one_or_more(choice(*SCHEMES), "schemes"), ("hybrid",))
+    num_slots: tuple[int, ...] | None = parameter(
+        optional(one_or_more(count(), "numbers of slots")), None
+    )
     learners: int = parameter(count(), 1)
+    """Of each scheme and horizon; their seeds follow ``seed``."""
     seed: int = parameter(count(0), 0)
     device: str = parameter(text, "cpu")
     threads: int = parameter(count(), 1)
@@ -35,15 +41,20 @@ class Train(Parameters):
     Train,
     groups={"scenario": "two_clusters", "algorithm": "ddpg"},
     sections={"training": TrainingParameters, "logger": LoggerParameters},
-    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${hydra.runtime.choices.scenario}_${scheme}"
+    run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${hydra.runtime.choices.scenario}"
     "_${hydra.runtime.choices.algorithm}_${seed}",
 )
 def main(config: Config, directory: Path) -> None:
     """Train, and say where the run is."""
     options = section(config, Train)
     torch.set_num_threads(options.threads)
-    schemes = [options.scheme] * options.learners
-    configuration = RunConfiguration.from_dict({**config, "schemes": schemes})
+    learners = [
+        Learner(scheme, options.seed + index, num_slots)
+        for scheme in options.scheme
+        for num_slots in options.num_slots or (None,)
+        for index in range(options.learners)
+    ]
+    configuration = RunConfiguration.from_dict({**config, "learners": learners})
     console = Console()
     run = train(
         directory,
@@ -54,7 +65,7 @@ def main(config: Config, directory: Path) -> None:
         request=config,
         initial_weights=None if options.warm_start is None else saved_weights(options.warm_start),
     )
-    best = run.metrics()["best_evaluation"].dropna().tail(options.learners)
+    best = run.metrics()["best_evaluation"].dropna().tail(len(learners))
     returns = ", ".join(f"{value:.2f}" for value in best)
     console.print(f"best noise-free accumulated reward (bps/Hz): {returns}")
     console.print(f"run: {run.path}", soft_wrap=True)

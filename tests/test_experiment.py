@@ -15,6 +15,7 @@ from hyuav.experiment import (
     train,
 )
 from hyuav.learning.algorithms import DDPG
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.tracking import LoggerParameters
@@ -23,11 +24,10 @@ SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
 CONFIGURATION = RunConfiguration(
     "two_clusters",
     SCENARIO,
-    ("hybrid", "relay", "jamming"),
+    (Learner("hybrid", 3), Learner("relay", 3), Learner("jamming", 3)),
     "ddpg",
     DDPG(hidden_sizes=(16,)),
     TrainingParameters(num_episodes=4, batch_size=8, evaluation_every=2, evaluation_episodes=300),
-    3,
 )
 OFF, SILENT = LoggerParameters(mode="disabled"), Console(file=io.StringIO())
 
@@ -36,10 +36,9 @@ def test_training_begins_with_the_candidates_that_earn_most_under_each_scheme() 
     weights, earned = select_initial_weights(CONFIGURATION, candidates=3, episodes=2)
     alone = Training(
         SCENARIO,
-        CONFIGURATION.schemes,
+        CONFIGURATION.learners,
         CONFIGURATION.algorithm,
         CONFIGURATION.training,
-        CONFIGURATION.seed,
     )
     alone.warm_start(weights)
     assert alone.best_evaluation.tolist() == pytest.approx(earned, abs=0.3)  # other draws

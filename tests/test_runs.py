@@ -5,6 +5,7 @@ import pytest
 
 from hyuav import InputError, Scenario
 from hyuav.learning.algorithms import ALGORITHMS, SAC, TD3
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.runs import (
     MetricsFile,
@@ -17,11 +18,10 @@ from hyuav.runs import (
 CONFIGURATION = RunConfiguration(
     "custom",
     dataclasses.replace(Scenario.preset("two_clusters"), num_slots=7, noise_power=2.5e-13),
-    ("hybrid", "jamming"),
+    (Learner("hybrid", 11), Learner("jamming", 11, 12)),
     "td3",
     TD3(hidden_sizes=(5,), actor_every=3),
     TrainingParameters(num_episodes=2),
-    11,
 )
 
 
@@ -51,7 +51,7 @@ def test_a_run_in_the_place_of_a_file_is_refused(tmp_path: Path) -> None:
         "seed: 3",
         "a: [",
         "seed: !!int many",
-        "scenario: {name: x}\nschemes: [hybrid]",
+        "scenario: {name: x}\nlearners: [{scheme: hybrid}]",
         "\x00\xff",
     ],
 )
@@ -67,11 +67,14 @@ def test_a_directory_that_is_no_run_is_refused_in_one_line(
 @pytest.mark.parametrize(
     ("entry", "value"),
     [
-        ("schemes", ["hybrid", "both"]),
-        ("schemes", "hybrid"),
-        ("schemes", []),
-        ("seed", "many"),
-        ("seed", -1),
+        ("learners", [{"scheme": "both"}]),
+        ("learners", "hybrid"),
+        ("learners", ["hybrid"]),
+        ("learners", []),
+        ("learners", [{"seed": "many"}]),
+        ("learners", [{"seed": -1}]),
+        ("learners", [{"num_slots": 0}]),
+        ("learners", [{"scheme": "relay"}, {"scheme": "relay"}]),
         ("algorithm", {"name": "ppo"}),
         ("algorithm", "ddpg"),
         ("algorithm", {"name": "ddpg", "discount": 2}),

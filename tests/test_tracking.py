@@ -8,6 +8,7 @@ from rich.console import Console
 from hyuav import InputError, Scenario
 from hyuav.learning.algorithms import DDPG
 from hyuav.learning.checkpoint import load_checkpoint
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.tracking import LoggerParameters, Tracker, learner_names
@@ -16,18 +17,17 @@ from offline_wandb import logged_history
 CONFIGURATION = RunConfiguration(
     "two_clusters",
     Scenario.preset("two_clusters"),
-    ("hybrid", "relay"),
+    (Learner("hybrid"), Learner("relay")),
     "ddpg",
     DDPG(hidden_sizes=(8,)),
     TrainingParameters(num_episodes=5, batch_size=8, evaluation_every=2, evaluation_episodes=3),
-    0,
 )
 
 
 def track(directory: Path, mode: str, console: Console | None = None) -> Training:
     training = Training(
         CONFIGURATION.scenario,
-        CONFIGURATION.schemes,
+        CONFIGURATION.learners,
         CONFIGURATION.algorithm,
         CONFIGURATION.training,
     )
@@ -48,6 +48,7 @@ def test_metrics_are_kept_as_columns_a_row_per_episode_and_learner(tmp_path: Pat
         for learner, scheme in enumerate(("hybrid", "relay"))
     ]
     assert metrics["slots"].max() == 100
+    assert set(metrics["num_slots"]) == {20}
     assert metrics["accumulated_reward"].notna().all()
     evaluated = metrics[metrics["evaluation"].notna()]
     assert evaluated["episode"].unique().tolist() == [2, 4, 5]
@@ -61,7 +62,7 @@ def test_checkpoints_are_written(tmp_path: Path) -> None:
     training = track(tmp_path, "disabled")
     run = RunDirectory(tmp_path)
     state = load_checkpoint(run.last_checkpoint, "training")
-    assert state["slots"] == 100
+    assert [cohort["episode"] for cohort in state["cohorts"]] == [5] * len(training.cohorts)
     best = run.best_weights()
     assert all(torch.equal(best[name], training.best_weights[name]) for name in best)
 
@@ -91,9 +92,13 @@ def test_progress_is_quiet_when_piped_and_shows_the_return_on_a_terminal(tmp_pat
     assert "bps/Hz" in terminal.getvalue()
 
 
-def test_learners_are_named_by_scheme_and_numbered_among_equals() -> None:
-    assert learner_names(["hybrid", "relay"]) == ["hybrid", "relay"]
-    assert learner_names(["hybrid", "relay", "hybrid"]) == ["hybrid_0", "relay", "hybrid_1"]
+def test_learners_are_named_by_what_tells_them_apart() -> None:
+    schemes = [Learner("hybrid"), Learner("relay")]
+    seeds = [Learner("hybrid", 3), Learner("hybrid", 4)]
+    horizons = [Learner("relay", 3, 10), Learner("relay", 4, 20)]
+    assert learner_names(schemes) == ["hybrid", "relay"]
+    assert learner_names(seeds) == ["hybrid_seed3", "hybrid_seed4"]
+    assert learner_names(horizons) == ["relay_T10_seed3", "relay_T20_seed4"]
 
 
 def test_an_unknown_logger_mode_is_refused() -> None:

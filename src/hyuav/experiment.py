@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import torch
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -15,8 +16,9 @@ from hyuav.errors import InputError
 from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
 from hyuav.figures import flight_map, learning_curves, save_figure, sum_rate_maps
 from hyuav.learning.checkpoint import load_weights_file
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training
-from hyuav.learning.weights import join_learners, load_weights, select_learner
+from hyuav.learning.weights import join_learners, select_learner
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
@@ -56,10 +58,9 @@ def train(
     """
     training = Training(
         configuration.scenario,
-        configuration.schemes,
+        configuration.learners,
         configuration.algorithm,
         configuration.training,
-        configuration.seed,
         device,
     )
     if initial_weights is not None:
@@ -91,37 +92,48 @@ def select_initial_weights(
 ) -> tuple[dict[str, Tensor], list[float]]:
     """Begin where a higher reward was reached: the best flyer of a few short trainings.
 
-    The paper sets its initial weights so. Every scheme trains its candidates, and every learner
-    begins with whichever candidate, of any scheme, earns most under the learner's own scheme.
-    They are judged as best weights are, without noise and on the training's evaluation fading.
+    The paper sets its initial weights so. For each seed of the training, every scheme trains its
+    candidates, and a learner of that seed begins with whichever of them, of any scheme, earns most
+    under the learner's own scheme. They are judged as best weights are, without noise and on the
+    training's evaluation fading.
 
     Args:
         configuration: of the training to come; N is its number of learners.
-        candidates: short trainings for each of its schemes.
+        candidates: short trainings for each of its schemes and seeds.
         episodes: of each candidate.
         device: to train on.
 
     Returns:
         the chosen candidates' weights, and what they earn (N,) in bps/Hz.
     """
-    rules = tuple(dict.fromkeys(configuration.schemes))
+    learners = configuration.learners
+    rules = tuple(dict.fromkeys(learner.scheme for learner in learners))
+    seeds = tuple(dict.fromkeys(learner.seed for learner in learners))
+    owners = [seed for seed in seeds for _ in rules for _ in range(candidates)]
     training = Training(
         configuration.scenario,
-        [rule for rule in rules for _ in range(candidates)],
+        [
+            Learner(rule, seed * candidates + candidate)
+            for seed in seeds
+            for rule in rules
+            for candidate in range(candidates)
+        ],
         configuration.algorithm,
         dataclasses.replace(configuration.training, num_episodes=episodes),
-        configuration.seed,
         device,
     )
     for _ in training.episodes():
         pass
-    load_weights(training.algorithm.loss, training.best_weights)
-    chosen, earned = [], []
-    for rule in configuration.schemes:
-        evaluation = training.evaluate(rule)
-        chosen.append(select_learner(training.best_weights, int(evaluation.argmax())))
-        earned.append(float(evaluation.max()))
-    return join_learners(chosen), earned
+    weights = training.best_weights
+    training.load_weights(weights)
+    earned = {rule: training.evaluate(rule) for rule in rules}
+    chosen, best = [], []
+    for learner in learners:
+        own = torch.tensor([owner == learner.seed for owner in owners])
+        reached = earned[learner.scheme].where(own, -torch.inf)
+        chosen.append(select_learner(weights, int(reached.argmax())))
+        best.append(float(reached.max()))
+    return join_learners(chosen), best
 
 
 def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[str, list[Policy]]:
@@ -135,9 +147,9 @@ def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[s
     for run in runs:
         configuration, weights = run.configuration(), run.best_weights()
         clock = configuration.training.clock
-        for learner, scheme in enumerate(configuration.schemes):
-            module = LearnedPolicy(scenario, configuration.algorithm, weights, learner, clock=clock)
-            policies.setdefault(LEARNED[scheme], []).append(Policy(module, clock))
+        for index, learner in enumerate(configuration.learners):
+            module = LearnedPolicy(scenario, configuration.algorithm, weights, index, clock=clock)
+            policies.setdefault(LEARNED[learner.scheme], []).append(Policy(module, clock))
     return policies
 
 

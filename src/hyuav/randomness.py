@@ -3,7 +3,7 @@
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -53,6 +53,9 @@ class RowStream:
         draws = [self._draw(BLOCK, generator) for generator in self._generators]
         self._block = torch.stack(draws, dim=1).to(self._device)
         self._used = 0
+
+    def __iter__(self) -> Self:
+        return self
 
     def __next__(self) -> Tensor:
         """The next draw: (rows, *shape)."""

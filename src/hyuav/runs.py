@@ -2,6 +2,7 @@
 
 import csv
 import tempfile
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,16 +15,18 @@ from torch import Tensor
 from hyuav.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import choice, count, read_yaml, sequence
+from hyuav.parameters import read_yaml, sequence
 from hyuav.scenario import PRESETS, Scenario
-from hyuav.system import SCHEMES
 
 METRIC_COLUMNS = (
     "episode",
     "slots",
     "learner",
     "scheme",
+    "seed",
+    "num_slots",
     "accumulated_reward",
     "evaluation",
     "best_evaluation",
@@ -38,11 +41,10 @@ class RunConfiguration:
 
     scenario_name: str
     scenario: Scenario
-    schemes: tuple[str, ...]
+    learners: tuple[Learner, ...]
     algorithm_name: str
     algorithm: AlgorithmParameters
     training: TrainingParameters
-    seed: int
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "RunConfiguration":
@@ -51,7 +53,7 @@ class RunConfiguration:
         Raises:
             InputError: a missing or unacceptable entry.
         """
-        for name in ("scenario", "schemes", "algorithm", "training", "seed"):
+        for name in ("scenario", "learners", "algorithm", "training"):
             if name not in values:
                 raise InputError(f"configuration: {name} is missing")
         scenario_name, scenario = named_scenario(values["scenario"])
@@ -59,25 +61,39 @@ class RunConfiguration:
         return cls(
             scenario_name,
             scenario,
-            _schemes("schemes", values["schemes"]),
+            _learners("learners", values["learners"]),
             algorithm_name,
             algorithm,
             TrainingParameters.from_dict(mapping("training", values["training"])),
-            count(0)("seed", values["seed"]),
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as they stand in ``config.yaml``."""
         return {
             "scenario": {"name": self.scenario_name, **self.scenario.to_dict()},
-            "schemes": list(self.schemes),
+            "learners": [learner.to_dict() for learner in self.learners],
             "algorithm": {"name": self.algorithm_name, **self.algorithm.to_dict()},
             "training": self.training.to_dict(),
-            "seed": self.seed,
         }
 
 
-_schemes = sequence(choice(*SCHEMES), f"a list of {', '.join(SCHEMES)}")
+def _learner(name: str, value: object) -> Learner:
+    if isinstance(value, Learner):
+        return value
+    fields = mapping(name, value)
+    try:
+        return Learner.from_dict(fields)
+    except InputError as error:
+        raise type(error)(f"{name}: {error}") from None
+
+
+def _learners(name: str, values: object) -> tuple[Learner, ...]:
+    learners: tuple[Learner, ...] = sequence(_learner, "a list of learners")(name, values)
+    twice = [learner for learner, times in Counter(learners).items() if times > 1]
+    if twice:
+        accepted = "learners that differ in scheme, seed or num_slots"
+        raise InputError(rejection(name, twice[0].to_dict(), accepted))
+    return learners
 
 
 def require_writable(name: str, directory: Path) -> None:

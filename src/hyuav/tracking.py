@@ -1,7 +1,7 @@
 """Where a training reports to: its run directory, Weights & Biases and the terminal."""
 
+import math
 import time
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -20,9 +20,13 @@ from rich.progress import (
 from torchrl.record.loggers.wandb import WandbLogger
 
 from hyuav.learning.checkpoint import save_checkpoint
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Episode, Training
 from hyuav.parameters import Parameters, choice, parameter, text
 from hyuav.runs import METRIC_COLUMNS, MetricsFile, RunConfiguration, RunDirectory
+
+_IDENTITY = ("episode", "slots", "learner", "scheme", "seed", "num_slots", "seconds")
+"""Columns that say which learner's episode a row is, not what it brought."""
 
 
 @dataclass(frozen=True)
@@ -33,14 +37,16 @@ class LoggerParameters(Parameters):
     project: str = parameter(text, "hyuav")
 
 
-def learner_names(schemes: Sequence[str]) -> list[str]:
-    """The scheme of each learner, numbered from 0 where several fly the same one."""
-    totals, seen = Counter(schemes), Counter[str]()
-    names = []
-    for scheme in schemes:
-        names.append(scheme if totals[scheme] == 1 else f"{scheme}_{seen[scheme]}")
-        seen[scheme] += 1
-    return names
+def learner_names(learners: Sequence[Learner]) -> list[str]:
+    """The scheme of each learner, with its horizon and seed where they tell learners apart."""
+    several_horizons = len({learner.num_slots for learner in learners}) > 1
+    several_seeds = len({learner.seed for learner in learners}) > 1
+    return [
+        learner.scheme
+        + (f"_T{learner.num_slots or 0}" if several_horizons else "")
+        + (f"_seed{learner.seed}" if several_seeds else "")
+        for learner in learners
+    ]
 
 
 class Tracker:
@@ -67,8 +73,8 @@ class Tracker:
         console: Console,
     ) -> None:
         self.run, self.training = run, training
-        self.names = learner_names(training.schemes)
-        steps = tuple(f"loss_{step.name}" for step in training.algorithm.steps)
+        self.names = learner_names(training.learners)
+        steps = tuple(f"loss_{name}" for name in training.steps)
         self._metrics = MetricsFile(run.metrics_file, (*METRIC_COLUMNS, *steps))
         self._wandb = _wandb_logger(run, configuration, logger)
         self._progress = Progress(
@@ -127,22 +133,35 @@ class Tracker:
         if episode.evaluation is not None:
             columns["evaluation"] = episode.evaluation.tolist()
             columns["best_evaluation"] = self.training.best_evaluation.tolist()
-        shared = {"episode": episode.number, "slots": episode.slots, "seconds": seconds}
         return [
-            shared
-            | {"learner": learner, "scheme": scheme}
-            | {name: values[learner] for name, values in columns.items()}
-            for learner, scheme in enumerate(self.training.schemes)
+            {
+                "episode": episode.number,
+                "slots": episode.slots[index],
+                "learner": index,
+                "scheme": learner.scheme,
+                "seed": learner.seed,
+                "num_slots": self.training.horizons[index],
+                "seconds": seconds,
+            }
+            | {
+                name: values[index]
+                for name, values in columns.items()
+                if not math.isnan(values[index])  # before the first update there is no loss
+            }
+            for index, learner in enumerate(self.training.learners)
         ]
 
 
 def _by_learner(names: Sequence[str], rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The rows' measurements as one flat record: ``hybrid/accumulated_reward`` and so on."""
-    record: dict[str, Any] = {name: rows[0][name] for name in ("slots", "seconds")}
+    record: dict[str, Any] = {
+        "slots": max(row["slots"] for row in rows),
+        "seconds": rows[0]["seconds"],
+    }
     for name, row in zip(names, rows, strict=True):
-        for column, value in row.items():
-            if column not in ("episode", "slots", "seconds", "learner", "scheme"):
-                record[f"{name}/{column}"] = value
+        record |= {
+            f"{name}/{column}": value for column, value in row.items() if column not in _IDENTITY
+        }
     return record
 
 

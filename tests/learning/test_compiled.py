@@ -1,49 +1,165 @@
-"""The compiled update against the eager one."""
+"""The compiled slots against the eager ones, and the change from one to the other."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
 
-from batches import mini_batch
+from hyuav import Scenario
+from hyuav.learning import training as training_module
 from hyuav.learning.algorithms import ALGORITHMS
-from hyuav.learning.compiled import CompiledUpdate, pays
-from hyuav.learning.weights import copy_weights, load_weights
+from hyuav.learning.cohort import Cohort, Learner
+from hyuav.learning.training import Training, TrainingParameters
+
+SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
+FADELESS = dataclasses.replace(SCENARIO, fading=False, edge_energy_budget=8.0, speed_limit="disc")
+LEARNERS = [Learner("hybrid", 1), Learner("relay", 2), Learner("jamming", 3)]
+SLOWLY_COMPILED = [
+    "ddpg",
+    pytest.param("td3", marks=pytest.mark.slow),
+    pytest.param("sac", marks=pytest.mark.slow),
+]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "ddpg",
-        pytest.param("td3", marks=pytest.mark.slow),
-        pytest.param("sac", marks=pytest.mark.slow),
-    ],
-)
-def test_a_compiled_update_is_the_eager_one_up_to_rounding(name: str) -> None:
+def cohort(name: str, scenario: Scenario = SCENARIO, batch_size: int = 8) -> Cohort:
+    return Cohort(
+        scenario,
+        LEARNERS,
+        ALGORITHMS[name](hidden_sizes=(12, 8)),
+        replay_size=30,
+        batch_size=batch_size,
+        clock=False,
+        device=None,
+    )
+
+
+def tensors(trained: Cohort) -> dict[str, torch.Tensor]:
+    """Everything that a slot changes."""
+    found = dict(trained.algorithm.modules.state_dict())
+    for step in trained.algorithm.steps:
+        for index, state in enumerate(step.optimizer.state_dict()["state"].values()):
+            found |= {f"{step.name}.{index}.{key}": values for key, values in state.items()}
+    found |= {str(key): values for key, values in trained.replay[:].items(True, True)}
+    carrier = trained.collector._carrier
+    found |= {f"carrier.{key}": carrier[key] for key in ("observation", "mode", "step_count")}
+    return {
+        name: values.clone() for name, values in found.items() if isinstance(values, torch.Tensor)
+    }
+
+
+def assert_agree(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> None:
+    assert one.keys() == other.keys()
+    for name, values in one.items():
+        torch.testing.assert_close(other[name], values, rtol=2e-3, atol=2e-5, msg=name)
+
+
+@pytest.mark.parametrize("name", SLOWLY_COMPILED)
+@pytest.mark.parametrize("scenario", [SCENARIO, FADELESS])
+def test_compiled_slots_are_the_eager_ones_up_to_rounding(name: str, scenario: Scenario) -> None:
     torch.manual_seed(0)
-    eager, other = (ALGORITHMS[name](hidden_sizes=(12, 8)).build(2, 15) for _ in range(2))
-    load_weights(other.loss, copy_weights(eager.loss))
-    update = CompiledUpdate(other)
-    batches = [mini_batch(2, 20) for _ in range(4)]
-    for index, batch in enumerate(batches, start=1):
-        torch.manual_seed(index)
-        expected = eager.update_networks(batch.clone(), index)
-        eager.update_targets(index)
-        torch.manual_seed(index)
-        losses = update(batch.clone(), index)
-        torch.testing.assert_close(losses, expected, rtol=1e-4, atol=1e-5)
-    weights, others = copy_weights(eager.loss), copy_weights(other.loss)
-    for key, values in weights.items():
-        torch.testing.assert_close(others[key], values, rtol=1e-3, atol=1e-5)
-    for one, two in zip(eager.steps, other.steps, strict=True):
-        moments = [step.optimizer.state_dict()["state"] for step in (one, two)]
-        torch.testing.assert_close(moments[1], moments[0], rtol=1e-3, atol=1e-6)
+    eager, other = cohort(name, scenario), cohort(name, scenario)
+    for trained in (eager, other):
+        for _ in range(2):
+            trained.fly()
+    assert other.learns
+    before = tensors(other)
+    other.compile(beside_others=False)
+    after = tensors(other)
+    assert all(torch.equal(before[key], after[key]) for key in before)  # recording does nothing
+    for _ in range(9):  # beyond the end of the replay
+        reward, losses = eager.fly()
+        other_reward, other_losses = other.fly()
+        torch.testing.assert_close(other_reward, reward, rtol=1e-3, atol=1e-4)
+        torch.testing.assert_close(other_losses, losses, rtol=1e-2, atol=1e-4)
+        assert_agree(tensors(eager), tensors(other))
+    assert (other.episode, other.updates) == (eager.episode, eager.updates)
+    other._compiled = None  # and from the compiled path back to the eager one
+    eager.fly()
+    other.fly()
+    assert_agree(tensors(eager), tensors(other))
+
+
+def test_nothing_is_compiled_before_every_slot_is_followed_by_an_update() -> None:
+    waiting = cohort("ddpg", batch_size=12)
+    learns = []
+    for _ in range(4):
+        learns.append(waiting.learns)
+        waiting.fly()
+    assert learns == [False, False, False, True]  # 0, 5, 10, 15 slots stored
+
+
+def trained(learners: list[Learner], **changes: Any) -> Training:
+    parameters = TrainingParameters(
+        num_episodes=6, replay_size=20, batch_size=8, evaluation_every=2, evaluation_episodes=4
+    )
+    return Training(
+        SCENARIO,
+        learners,
+        ALGORITHMS["ddpg"](hidden_sizes=(16, 8)),
+        dataclasses.replace(parameters, **changes),
+    )
+
+
+@pytest.mark.parametrize("cohorts", [1, 2])
+def test_a_compiled_training_agrees_with_an_eager_one(cohorts: int) -> None:
+    learners = [Learner("hybrid", seed) for seed in range(4)]
+    eager, graph = (
+        trained(learners, compile=choice, cohorts=cohorts) for choice in ("never", "always")
+    )
+    for one, two in zip(eager.episodes(), graph.episodes(), strict=True):
+        torch.testing.assert_close(
+            one.accumulated_reward, two.accumulated_reward, rtol=1e-3, atol=1e-3
+        )
+    assert all(cohort.is_compiled for cohort in graph.cohorts)
+    assert not any(cohort.is_compiled for cohort in eager.cohorts)
+
+
+def test_disturbing_one_learner_leaves_the_others_bit_for_bit_in_compiled_slots() -> None:
+    learners = [Learner("hybrid", seed) for seed in range(3)]
+    plain, disturbed = (trained(learners, compile="always", cohorts=1) for _ in range(2))
+    for parameter in disturbed.cohorts[0].algorithm.loss.parameters():
+        parameter.data[1].add_(0.1)
+    list(plain.episodes())
+    list(disturbed.episodes())
+    one, other = (dict(t.cohorts[0].algorithm.loss.named_parameters()) for t in (plain, disturbed))
+    for name, values in one.items():
+        assert torch.equal(values[0], other[name][0])
+        assert torch.equal(values[2], other[name][2])
+        assert not torch.equal(values[1], other[name][1])
+
+
+def test_where_the_compiler_fails_training_goes_on_without_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    broken = tmp_path / "g++"
+    broken.write_text("#!/bin/sh\necho 'fatal error: Python.h: No such file' >&2\nexit 1\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("TORCHINDUCTOR_CACHE_DIR", str(tmp_path / "empty-cache"))
+    monkeypatch.setattr(training_module, "COMPILE_SECONDS", 0.0)
+    plain, other = (trained(LEARNERS, compile=choice) for choice in ("never", "auto"))
+    expected = list(plain.episodes())
+    with (
+        torch._inductor.config.patch({"cpp.cxx": (str(broken),)}),
+        pytest.warns(UserWarning, match="training goes on without compiling"),
+    ):
+        episodes = list(other.episodes())
+    for one, two in zip(expected, episodes, strict=True):
+        assert torch.equal(one.accumulated_reward, two.accumulated_reward)
 
 
 def test_compiling_pays_for_long_trainings_only() -> None:
-    assert pays(20_000, learners=1)
-    assert not pays(1_000, learners=3)
-    assert pays(3_000, learners=30)
+    def pays(episodes: int, learners: int) -> bool:
+        chosen = [Learner("hybrid", seed) for seed in range(learners)]
+        return trained(chosen, num_episodes=episodes)._compiling_pays()
+
+    assert pays(4_000, learners=1)
+    assert not pays(200, learners=3)
+    assert pays(1_000, learners=30)
 
 
 def test_without_a_compiler_nothing_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CXX", "no-such-compiler")
-    assert not pays(10**9, learners=100)
+    assert not trained(LEARNERS, num_episodes=10**9)._compiling_pays()
+    assert trained(LEARNERS, compile="always")._compiling_pays()

@@ -7,6 +7,7 @@ import torch
 
 from hyuav import Scenario
 from hyuav.learning.algorithms import ALGORITHMS
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.schemes.optimum import solve
 
@@ -25,7 +26,7 @@ def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
     parameters = TrainingParameters(
         num_episodes=80, batch_size=64, evaluation_every=5, evaluation_episodes=1
     )
-    training = Training(EASY, ("jamming",) * 3, algorithm, parameters, seed=0)
+    training = Training(EASY, [Learner("jamming", i) for i in range(3)], algorithm, parameters)
     list(training.episodes())
     optimum = solve(EASY, ["jamming"], resolution=2.0)["jamming"].value
     assert training.best_evaluation.median().item() > 0.85 * optimum

@@ -1,7 +1,9 @@
+import pytest
 import torch
 from tensordict import TensorDict, TensorDictBase
+from torchrl.data import ReplayBuffer
 
-from hyuav.learning.replay import TRANSITION, as_transition, make_replay
+from hyuav.learning.replay import TRANSITION, as_transition, make_replay, sampled_slots
 
 
 def transition(learners: int, slot: int) -> TensorDictBase:
@@ -17,8 +19,23 @@ def transition(learners: int, slot: int) -> TensorDictBase:
     )
 
 
+def replay_of(learners: int, capacity: int, batch_size: int) -> ReplayBuffer:
+    uniforms = iter(lambda: torch.rand(learners, batch_size), None)
+    return make_replay(capacity, batch_size, uniforms, torch.device("cpu"))
+
+
+@pytest.mark.parametrize("length", [1, 7, 8000])
+def test_every_stored_slot_is_drawn_as_often_and_no_other(length: int) -> None:
+    grid = (torch.arange(10 * length) + 0.5) / (10 * length)
+    drawn = sampled_slots(grid, length)
+    assert drawn.bincount(minlength=length).sub(10).abs().max() <= 1  # rounding of the grid
+    edges = torch.tensor([0.0, 1.0 - 2**-24, 1.0])
+    assert sampled_slots(edges, length).tolist() == [0, length - 1, length - 1]
+    assert torch.equal(sampled_slots(grid, torch.tensor([length])), drawn)
+
+
 def test_each_learner_samples_only_its_own_transitions() -> None:
-    replay = make_replay(3, 50, 200, torch.device("cpu"))
+    replay = replay_of(3, 50, 200)
     for slot in range(30):
         replay.extend(as_transition(transition(3, slot)).unsqueeze(0))
     rewards = replay.sample()["next", "reward"][..., 0]
@@ -27,7 +44,7 @@ def test_each_learner_samples_only_its_own_transitions() -> None:
 
 
 def test_learners_sample_different_slots() -> None:
-    replay = make_replay(2, 50, 200, torch.device("cpu"))
+    replay = replay_of(2, 50, 200)
     for slot in range(50):
         replay.extend(as_transition(transition(2, slot)).unsqueeze(0))
     slots = replay.sample()["next", "reward"][..., 0] % 1000
@@ -35,7 +52,7 @@ def test_learners_sample_different_slots() -> None:
 
 
 def test_the_oldest_transitions_are_overwritten() -> None:
-    replay = make_replay(1, 20, 500, torch.device("cpu"))
+    replay = replay_of(1, 20, 500)
     for slot in range(35):
         replay.extend(as_transition(transition(1, slot)).unsqueeze(0))
     sampled = set(replay.sample()["next", "reward"].flatten().tolist())

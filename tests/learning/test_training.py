@@ -7,39 +7,51 @@ import torch
 
 from hyuav import Scenario
 from hyuav.errors import InputError, InputTypeError
-from hyuav.learning import compiled
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
-from hyuav.learning.randomness import RandomStream
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.learning.weights import copy_weights
+from hyuav.learning.weights import copy_weights, select_learner
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 SHORT = TrainingParameters(
-    num_episodes=6, replay_size=20, batch_size=8, evaluation_every=2, evaluation_episodes=4
+    num_episodes=6,
+    replay_size=20,
+    batch_size=8,
+    evaluation_every=2,
+    evaluation_episodes=4,
+    cohorts=2,
+    compile="never",
 )
+PAIR = (Learner("hybrid", 3), Learner("relay", 3))
+MIXED = (Learner("hybrid", 1, 3), Learner("relay", 2), Learner("jamming", 1, 3), Learner(seed=9))
+NAMES = sorted(ALGORITHMS)
 
 
-def training(
-    name: str = "ddpg",
-    schemes: tuple[str, ...] = ("hybrid", "relay"),
-    seed: int = 3,
-    **changes: Any,
-) -> Training:
+def training(name: str = "ddpg", learners: tuple[Learner, ...] = PAIR, **changes: Any) -> Training:
     algorithm = ALGORITHMS[name](hidden_sizes=(16, 8))
-    return Training(SCENARIO, schemes, algorithm, dataclasses.replace(SHORT, **changes), seed)
+    return Training(SCENARIO, learners, algorithm, dataclasses.replace(SHORT, **changes))
+
+
+def seeds(*numbers: int, scheme: str = "hybrid") -> tuple[Learner, ...]:
+    return tuple(Learner(scheme, seed) for seed in numbers)
+
+
+def weights(trained: Training, learner: int) -> dict[str, torch.Tensor]:
+    joined = trained._join([copy_weights(cohort.algorithm.loss) for cohort in trained.cohorts])
+    return select_learner(joined, learner)
 
 
 def test_there_is_one_update_after_every_slot_once_a_mini_batch_is_stored() -> None:
     trained = training()
-    slots = [(episode.slots, trained.updates) for episode in trained.episodes()]
-    assert slots == [(5 * n, max(0, 5 * n - 7)) for n in range(1, 7)]
+    slots = [(episode.slots, trained.cohorts[0].updates) for episode in trained.episodes()]
+    assert slots == [((5 * n, 5 * n), max(0, 5 * n - 7)) for n in range(1, 7)]
 
 
 def test_every_episode_reports_each_learners_undiscounted_return() -> None:
-    trained = training(schemes=("hybrid",) * 3, replay_size=100)
+    trained = training(learners=seeds(1, 2, 3), replay_size=100)
     returns = torch.stack([episode.accumulated_reward for episode in trained.episodes()])
-    rewards = trained.replay[:]["next", "reward"].squeeze(-1)
+    rewards = torch.cat([c.replay[:]["next", "reward"][..., 0] for c in trained.cohorts], dim=1)
     assert returns.shape == (6, 3)
     torch.testing.assert_close(returns, rewards.reshape(6, 5, 3).sum(dim=1))
 
@@ -50,31 +62,66 @@ def test_evaluations_come_as_often_as_asked_and_at_the_end() -> None:
 
 
 def test_the_best_weights_are_those_of_the_best_evaluation() -> None:
-    trained = training(schemes=("hybrid",) * 4, num_episodes=30, evaluation_every=1)
+    trained = training(learners=seeds(1, 2, 3, 4), num_episodes=30, evaluation_every=1)
     best = torch.full((4,), -torch.inf)
-    kept = copy_weights(trained.algorithm.loss)
+    kept = [weights(trained, learner) for learner in range(4)]
     for episode in trained.episodes():
         assert episode.evaluation is not None
-        for learner in (episode.evaluation > best).nonzero().flatten():
-            for name, values in copy_weights(trained.algorithm.loss).items():
-                axis = values.ndim - 3
-                kept[name].select(axis, learner).copy_(values.select(axis, learner))
+        for learner in (episode.evaluation > best).nonzero().flatten().tolist():
+            kept[learner] = weights(trained, learner)
         best = torch.maximum(best, episode.evaluation)
         assert torch.equal(trained.best_evaluation, best)
-    assert all(torch.equal(trained.best_weights[name], kept[name]) for name in kept)
+    for learner, own in enumerate(kept):
+        best_weights = select_learner(trained.best_weights, learner)
+        assert all(torch.equal(best_weights[name], own[name]) for name in own)
 
 
-def test_the_same_seed_trains_the_same_weights() -> None:
-    first, second, other = training(), training(), training(seed=4)
-    for trained in (first, second, other):
-        list(trained.episodes())
-    left, right = copy_weights(first.algorithm.loss), copy_weights(second.algorithm.loss)
-    assert all(torch.equal(left[name], right[name]) for name in left)
-    changed = copy_weights(other.algorithm.loss)
-    assert not all(torch.equal(left[name], changed[name]) for name in left)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_learner_learns_the_same_alone_and_among_others(name: str) -> None:
+    """Its numbers are its own; differently shaped products round differently."""
+    among = training(name, MIXED, cohorts=1)
+    for episode in among.episodes():
+        assert episode.slots == (3 * episode.number, 5 * episode.number) * 2
+    for index, learner in enumerate(MIXED):
+        alone = training(name, (learner,))
+        list(alone.episodes())
+        own, shared = weights(alone, 0), weights(among, index)
+        for key, values in own.items():
+            torch.testing.assert_close(shared[key], values, rtol=1e-3, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+def test_how_learners_are_divided_into_cohorts_changes_nothing_but_rounding() -> None:
+    few, many = training(learners=MIXED, cohorts=1), training(learners=MIXED, cohorts=3)
+    assert [len(few.cohorts), len(many.cohorts)] == [2, 4]
+    for one, other in zip(few.episodes(), many.episodes(), strict=True):
+        torch.testing.assert_close(
+            one.accumulated_reward, other.accumulated_reward, rtol=1e-3, atol=1e-3
+        )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_disturbing_one_learner_leaves_the_others_bit_for_bit(name: str) -> None:
+    plain, disturbed = (training(name, seeds(1, 2, 3), cohorts=1) for _ in range(2))
+    for parameter in disturbed.cohorts[0].algorithm.loss.parameters():
+        parameter.data.select(-min(parameter.ndim, 3), 1).add_(0.1)
+    list(plain.episodes())
+    list(disturbed.episodes())
+    for learner in (0, 2):
+        one, other = weights(plain, learner), weights(disturbed, learner)
+        assert all(torch.equal(one[key], other[key]) for key in one)
+    one, other = weights(plain, 1), weights(disturbed, 1)
+    assert not any(torch.equal(one[key], other[key]) for key in one)
+
+
+def test_learners_of_other_seeds_or_schemes_learn_differently() -> None:
+    trained = training(learners=(*seeds(3, 4), Learner("jamming", 3)))
+    list(trained.episodes())
+    first, other_seed, other_scheme = (weights(trained, index) for index in range(3))
+    for other in (other_seed, other_scheme):
+        assert not any(torch.equal(first[key], other[key]) for key in first)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_a_restored_training_continues_bit_for_bit(name: str, tmp_path: Path) -> None:
     whole = training(name)
     list(whole.episodes())
@@ -86,19 +133,19 @@ def test_a_restored_training_continues_bit_for_bit(name: str, tmp_path: Path) ->
     save_checkpoint(tmp_path / "last.pt", "training", interrupted.state_dict())
 
     continued = training(name)
-    continued._random = RandomStream(99, torch.device("cpu"))  # nothing of it may remain
-    continued.collector.env.set_seed(99)
+    next(continued.episodes())  # nothing of it may remain
     continued.load_state_dict(load_checkpoint(tmp_path / "last.pt", "training"))
     assert [episode.number for episode in continued.episodes()] == [4, 5, 6]
-    assert (continued.slots, continued.updates) == (whole.slots, whole.updates)
-    left, right = copy_weights(whole.algorithm.loss), copy_weights(continued.algorithm.loss)
-    assert all(torch.equal(left[name], right[name]) for name in left)
+    for learner in range(2):
+        left, right = weights(whole, learner), weights(continued, learner)
+        assert all(torch.equal(left[key], right[key]) for key in left)
     assert torch.equal(whole.best_evaluation, continued.best_evaluation)
-    assert all(torch.equal(whole.best_weights[name], continued.best_weights[name]) for name in left)
+    best = whole.best_weights, continued.best_weights
+    assert all(torch.equal(best[0][key], best[1][key]) for key in best[0])
 
 
 def test_a_state_of_another_training_is_refused_in_one_line() -> None:
-    state = training(schemes=("hybrid",) * 3).state_dict()
+    state = training(learners=seeds(1, 2, 3)).state_dict()
     with pytest.raises(InputError, match=r"^checkpoint: not of a training like this one[^\n]*$"):
         training().load_state_dict(state)
     with pytest.raises(InputError, match=r"^checkpoint: [^\n]*$"):
@@ -108,23 +155,34 @@ def test_a_state_of_another_training_is_refused_in_one_line() -> None:
 def test_a_warm_start_begins_with_the_earlier_networks_and_targets() -> None:
     earlier = training()
     list(earlier.episodes())
-    later = training(seed=8)
+    later = training(learners=seeds(8, 9))
     later.warm_start(earlier.best_weights)
-    own = copy_weights(later.algorithm.loss)
-    assert all(torch.equal(own[name], earlier.best_weights[name]) for name in own)
-    assert all(torch.equal(own[name], later.best_weights[name]) for name in own)
+    for learner in range(2):
+        own, best = weights(later, learner), select_learner(later.best_weights, learner)
+        before = select_learner(earlier.best_weights, learner)
+        assert all(torch.equal(own[key], before[key]) for key in own)
+        assert all(torch.equal(best[key], before[key]) for key in own)
+    later.warm_start(select_learner(earlier.best_weights, 1))
+    assert all(
+        torch.equal(values, weights(later, 1)[key]) for key, values in weights(later, 0).items()
+    )
 
 
-def test_learners_fly_their_own_schemes() -> None:
-    trained = training(schemes=("hybrid", "relay", "jamming"))
-    env = trained.collector.env
-    assert env.base_env.schemes == ("hybrid", "relay", "jamming")
+def test_learners_fly_their_own_schemes_and_horizons() -> None:
+    trained = training(learners=MIXED)
+    flown = [
+        (scheme, cohort.scenario.num_slots)
+        for cohort in trained.cohorts
+        for scheme in cohort.env.base_env.schemes
+    ]
+    assert flown == [("hybrid", 3), ("jamming", 3), ("relay", 5), ("hybrid", 5)]
+    assert trained.horizons == (3, 5, 3, 5)
 
 
 def test_a_clock_lengthens_the_observation_by_one() -> None:
     trained = training(clock=True)
     list(trained.episodes())
-    assert trained.replay[:]["observation"].shape[-1] == SCENARIO.num_ues + 6
+    assert trained.cohorts[0].replay[:]["observation"].shape[-1] == SCENARIO.num_ues + 6
 
 
 def test_a_mini_batch_larger_than_the_replay_is_refused() -> None:
@@ -132,36 +190,12 @@ def test_a_mini_batch_larger_than_the_replay_is_refused() -> None:
         TrainingParameters(replay_size=20, batch_size=30)
 
 
-def test_schemes_are_a_list_and_the_algorithm_is_a_record() -> None:
-    with pytest.raises(InputTypeError, match="schemes = 'hybrid'"):
-        Training(SCENARIO, "hybrid", ALGORITHMS["ddpg"](), SHORT)
+@pytest.mark.parametrize("learners", ["hybrid", [], ["hybrid"], Learner()])
+def test_learners_are_a_list_of_learners(learners: Any) -> None:
+    with pytest.raises(InputTypeError, match=r"learners = [^\n]*: expected a list"):
+        Training(SCENARIO, learners, ALGORITHMS["ddpg"](), SHORT)
+
+
+def test_the_algorithm_is_a_record() -> None:
     with pytest.raises(InputTypeError, match="algorithm = 'ddpg'"):
-        Training(SCENARIO, ["hybrid"], "ddpg", SHORT)  # type: ignore[arg-type]
-
-
-def test_a_training_that_compiles_agrees_with_an_eager_one() -> None:
-    eager, graph = (training(compile=choice) for choice in ("never", "always"))
-    for one, two in zip(eager.episodes(), graph.episodes(), strict=True):
-        torch.testing.assert_close(
-            one.accumulated_reward, two.accumulated_reward, rtol=1e-3, atol=1e-3
-        )
-
-
-def test_where_the_compiler_fails_training_goes_on_without_it(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    broken = tmp_path / "g++"
-    broken.write_text("#!/bin/sh\necho 'fatal error: Python.h: No such file' >&2\nexit 1\n")
-    broken.chmod(0o755)
-    monkeypatch.setenv("TORCHINDUCTOR_CACHE_DIR", str(tmp_path / "empty-cache"))
-    monkeypatch.setattr(compiled, "COMPILE_SECONDS", 0.0)
-    torch._dynamo.reset()
-    plain, other = training(compile="never"), training(compile="auto")
-    expected = list(plain.episodes())
-    with (
-        torch._inductor.config.patch({"cpp.cxx": (str(broken),)}),
-        pytest.warns(UserWarning, match="training goes on without compiling"),
-    ):
-        episodes = list(other.episodes())
-    for one, two in zip(expected, episodes, strict=True):
-        assert torch.equal(one.accumulated_reward, two.accumulated_reward)
+        Training(SCENARIO, PAIR, "ddpg", SHORT)  # type: ignore[arg-type]

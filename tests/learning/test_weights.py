@@ -6,6 +6,9 @@ from hyuav.errors import InputError
 from hyuav.learning.algorithms import ALGORITHMS, DDPG
 from hyuav.learning.weights import (
     copy_weights,
+    count_learners,
+    draw_weights,
+    join_learners,
     load_weights,
     replace_learners,
     select_learner,
@@ -65,3 +68,33 @@ def test_other_networks_weights_are_refused_and_change_nothing(other: object) ->
         load_weights(algorithm.loss, copy_weights(other.loss))  # type: ignore[attr-defined]
     after = copy_weights(algorithm.loss)
     assert all(torch.equal(before[name], after[name]) for name in before)
+
+
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+def test_initial_weights_are_a_learners_own_and_follow_pytorchs_law(name: str) -> None:
+    many = ALGORITHMS[name](hidden_sizes=(300, 100)).build(3, 15)
+    one = ALGORITHMS[name](hidden_sizes=(300, 100)).build(1, 15)
+    draw_weights(many.loss, [4, 7, 5])
+    draw_weights(one.loss, [7])
+    weights, alone = copy_weights(many.loss), copy_weights(one.loss)
+    selected = select_learner(weights, 1)
+    assert all(torch.equal(alone[key], selected[key]) for key in alone)
+    for key, values in weights.items():
+        if key.endswith("layers.2.weight"):
+            bound = 300**-0.5
+            assert values.abs().max() <= bound
+            assert values.std().item() == pytest.approx(bound / 3**0.5, rel=0.02)
+            assert not torch.equal(values.select(-3, 0), values.select(-3, 1))
+        if key.startswith("target_"):
+            assert torch.equal(values, weights[key.removeprefix("target_")])
+    if name != "ddpg":
+        critics = weights["qvalue_network_params.module.layers.0.weight"]
+        assert not torch.equal(critics[0], critics[1])
+
+
+def test_joined_learners_are_counted_and_selected_again() -> None:
+    several = [copy_weights(DDPG(hidden_sizes=(8,)).build(n, 15).loss) for n in (1, 2)]
+    joined = join_learners(several)
+    assert [count_learners(each) for each in (*several, joined)] == [1, 2, 3]
+    last = select_learner(joined, 2)
+    assert all(torch.equal(last[key], select_learner(several[1], 1)[key]) for key in last)

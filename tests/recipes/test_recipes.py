@@ -59,8 +59,8 @@ def test_a_saved_scenario_is_chosen_by_the_name_of_its_file(call: Call, tmp_path
 
 def test_a_sweep_keeps_a_run_for_each_job(call: Call, tmp_path: Path) -> None:
     call("train", "--multirun", "seed=3,4", "hydra.sweep.dir=sweep", *TINY)
-    seeds = {RunDirectory(run).configuration().seed for run in (tmp_path / "sweep").glob("*/")}
-    assert seeds == {3, 4}
+    runs = [RunDirectory(run).configuration() for run in (tmp_path / "sweep").glob("*/")]
+    assert {run.learners[0].seed for run in runs} == {3, 4}
 
 
 def test_a_run_remembers_all_that_was_asked_for(call: Call, tmp_path: Path) -> None:

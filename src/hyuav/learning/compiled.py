@@ -1,109 +1,248 @@
-"""A whole update as one compiled graph: losses, gradients, Adam and the targets' soft update.
+"""A whole slot of training as one compiled graph: flying, storing, sampling and the update.
 
-This is the one place where PyTorch's optimizer and TorchRL's target updater are written out; the
-losses remain TorchRL's. The weights and the optimizers' state are the same tensors as in the
-eager path, so a training may change over at any time and a checkpoint serves both.
+What the graph does is recorded from the parts that the eager path is made of: exploration, the
+environment with its transforms, TorchRL's losses. Written out here is only what lies between
+them: storing to and sampling from the replay buffer's own tensors, Adam on the optimizers' own
+states, and the targets' soft update. Both paths share every tensor and every random number, so a
+training may change over between any two episodes and a checkpoint serves both.
 """
 
-import os
-import shutil
-import warnings
-from collections.abc import Callable
+import functools
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
-from torch._dynamo.exc import BackendCompilerFailed
-from torch._inductor.exc import InductorError
+from torchrl.data import ReplayBuffer
+from torchrl.envs import TransformedEnv
 
 from hyuav.learning.algorithms import Algorithm, GradientStep
+from hyuav.learning.recording import compile_recorded, record
+from hyuav.learning.replay import TRANSITION, as_transition, sampled_slots
+from hyuav.randomness import given_normals
+from hyuav.system import Tasks
 
-COMPILE_SECONDS = 40.0
-"""What compiling takes, on two cores."""
-
-SECONDS_SAVED = (0.004, 0.0013)
-"""Saved per update, and besides that per learner and update, on two cores."""
-
-COMPILATION_ERRORS = (BackendCompilerFailed, InductorError)
-"""What the first call raises where the graph cannot be compiled, as without Python's headers."""
-
-Losses = dict[str, Tensor]
+Program = Callable[..., Any]
 
 
-def pays(updates: int, learners: int) -> bool:
-    """Whether a training of so many updates gains more by compiling than it loses."""
-    if shutil.which(os.environ.get("CXX", "g++")) is None:
-        return False
-    per_update, per_learner = SECONDS_SAVED
-    return updates * (per_update + per_learner * learners) > COMPILE_SECONDS
+class _GivenDraws:
+    """One slot's fading and tasks, handed to the environment."""
+
+    def __init__(self, fading: Tensor | None, tasks: Tensor | None) -> None:
+        self._fading, self._tasks = fading, tasks
+
+    def fading(self) -> Tensor | None:
+        return self._fading
+
+    def tasks(self) -> Tasks:
+        assert self._tasks is not None
+        return Tasks(*self._tasks.unbind(dim=1))
 
 
-class CompiledUpdate:
-    """What :meth:`Algorithm.update_networks` and :meth:`~Algorithm.update_targets` do together.
-
-    The graph is compiled in the first call, and again for every other combination of steps that
-    an algorithm takes.
+class CompiledSlots:
+    """Lines 4 to 15 of Algorithm 1 for N learners of one horizon.
 
     Args:
-        algorithm: whose weights and optimizers are used from now on.
+        env: of batch size (N,).
+        algorithm: whose weights and optimizers' states are changed.
+        replay: which holds at least one transition.
+        batch_size: K.
+        carrier: what the helpers observe, (N,); an example.
+        beside_others: whether other threads run programs at the same time.
+
+    Raises:
+        One of :data:`hyuav.learning.recording.COMPILATION_ERRORS`.
     """
 
-    def __init__(self, algorithm: Algorithm) -> None:
-        self.algorithm = algorithm
-        self._adam = {step.name: _AdamState(step) for step in algorithm.steps}
+    def __init__(
+        self,
+        env: TransformedEnv,
+        algorithm: Algorithm,
+        replay: ReplayBuffer,
+        batch_size: int,
+        carrier: TensorDictBase,
+        *,
+        beside_others: bool,
+    ) -> None:
+        self._env, self._algorithm, self._replay = env, algorithm, replay
+        observed = (*env.observation_spec.keys(), *env.done_keys)
+        self._carrier = carrier.select(*observed).clone()
+        self._adam = {step.name: AdamState(step) for step in algorithm.steps}
         weights = dict(algorithm.loss.named_parameters())
         self._targets = [
-            (target, weights[name.removeprefix("target_")])
+            (target, weights[name.removeprefix("target_")].data)
             for name, target in algorithm.loss.named_buffers()
             if name.startswith("target_")
         ]
-        self._graphs: dict[tuple[bool, ...], Callable[[TensorDictBase], Losses]] = {}
+        learners, device = env.batch_size[0], env.device
+        self._storage = replay.storage._storage
+        self._learners = torch.arange(learners, device=device).unsqueeze(-1)
+        self._cursor = torch.zeros(1, dtype=torch.int64, device=device)
+        self._length = torch.zeros(1, dtype=torch.int64, device=device)
+        self._totals = {
+            name: torch.zeros(learners, device=device) for name in ("reward", *self._adam)
+        }
+        examples = self._examples(batch_size)
+        self._names = tuple(examples)
+        period = math.lcm(*(step.every for step in algorithm.steps), algorithm.target_every)
+        self._programs = {
+            taken: self._compile(taken, examples, beside_others=beside_others)
+            for taken in {algorithm.due(index) for index in range(1, period + 1)}
+        }
 
-    def __call__(self, batch: TensorDictBase, index: int) -> Losses:
-        """Update with a mini-batch (N, K); ``index`` counts updates from 1.
+    def fly(
+        self, carrier: TensorDictBase, draws: Mapping[str, Tensor], updates: int
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Fly and learn for as many slots as there are draws.
+
+        Args:
+            carrier: what the helpers observe before the first slot, (N,); left as it is.
+            draws: random numbers, a slot in each row: ``exploration`` (slots, N, 2) and
+                ``losses`` (slots, n, N, K, 2) standard normal, ``sampling`` (slots, N, K)
+                uniform, ``fading`` (slots, N, 3 U + 2) and ``tasks`` (slots, N, 2, U) where the
+                environment needs them.
+            updates: taken before.
 
         Returns:
-            the mean loss (N,) of each step that was taken, by the step's name.
+            the accumulated reward (N,) in bps/Hz, and each gradient step's mean loss (N,).
         """
-        taken = (
-            *(index % step.every == 0 for step in self.algorithm.steps),
-            index % self.algorithm.target_every == 0,
-        )
-        if taken not in self._graphs:
-            self._graphs[taken] = self._compile(taken)
-        with torch._dynamo.config.patch(trace_autograd_ops=True), warnings.catch_warnings():
-            warnings.simplefilter("ignore", FutureWarning)  # of settings that tensordict reads
-            return self._graphs[taken](batch)
+        slots = len(draws["exploration"])
+        self._begin(carrier)
+        counts = dict.fromkeys(self._adam, 0)
+        blocks = {**draws, "corrections": self._corrections(updates, slots)}
+        with torch.no_grad():
+            rows = zip(*(blocks[name] for name in self._names), strict=True)
+            for slot, inputs in enumerate(rows):
+                taken = self._algorithm.due(updates + slot + 1)
+                program, tensors = self._programs[taken]
+                program(*inputs, *tensors)
+                for name, due in zip(counts, taken, strict=False):
+                    counts[name] += due
+        self._end(updates + slots, slots)
+        losses = {name: self._totals[name] / count for name, count in counts.items() if count}
+        return self._totals["reward"].clone(), losses
 
-    def _compile(self, taken: tuple[bool, ...]) -> Callable[[TensorDictBase], Losses]:
-        steps = [step for step, due in zip(self.algorithm.steps, taken[:-1], strict=True) if due]
-        targets = self._targets if taken[-1] else []
-        rate = 1.0 - self.algorithm.target.eps  # tau
+    def _begin(self, carrier: TensorDictBase) -> None:
+        self._carrier.update_(carrier.select(*self._carrier.keys()))
+        self._cursor.fill_(self._replay.writer._cursor)
+        self._length.fill_(len(self._replay))
+        for total in self._totals.values():
+            total.zero_()
 
-        def update(batch: TensorDictBase) -> Losses:
-            losses = {}
-            for step in steps:
-                adam = self._adam[step.name]
+    def _end(self, updates: int, slots: int) -> None:
+        """Let the eager parts know what they did not count."""
+        capacity = self._replay.storage.max_size
+        cursor = (self._replay.writer._cursor + slots) % capacity
+        self._replay.storage._len = min(len(self._replay) + slots, capacity)
+        self._replay.writer.load_state_dict({"_cursor": cursor})
+        for step in self._algorithm.steps:
+            self._adam[step.name].set_count(updates // step.every)
+
+    def _corrections(self, updates: int, slots: int) -> Tensor:
+        """Adam's bias corrections in each slot and gradient step: (slots, steps, 2)."""
+        index = torch.arange(updates + 1, updates + slots + 1, dtype=torch.float64).unsqueeze(-1)
+        every = torch.tensor([float(step.every) for step in self._algorithm.steps])
+        betas = [self._adam[step.name].betas for step in self._algorithm.steps]
+        powers = torch.tensor(betas, dtype=torch.float64) ** (index // every).unsqueeze(-1)
+        first, second = (1.0 / (1.0 - powers)).unbind(dim=-1)
+        return torch.stack([first, second.sqrt()], dim=-1).float().to(self._env.device)
+
+    def _examples(self, batch_size: int) -> dict[str, Tensor]:
+        """Tensors of the shapes in which a slot's random numbers come."""
+        learners, device = self._env.batch_size[0], self._env.device
+        system, steps = self._env.base_env.system, self._algorithm.steps
+        num_ues, normals = system.scenario.num_ues, sum(step.normals for step in steps)
+        shapes: dict[str, tuple[int, ...]] = {
+            "exploration": (learners, 2),
+            "sampling": (learners, batch_size),
+            "corrections": (len(steps), 2),
+        }
+        if normals:
+            shapes["losses"] = (learners, normals, batch_size, 2)
+        if system.scenario.fading:
+            shapes["fading"] = (learners, 3 * num_ues + 2)
+        if system.edge_can_saturate:
+            shapes["tasks"] = (learners, 2, num_ues)
+        return {name: torch.zeros(shape, device=device) for name, shape in shapes.items()}
+
+    def _compile(
+        self, taken: tuple[bool, ...], examples: dict[str, Tensor], *, beside_others: bool
+    ) -> tuple[Program, list[Tensor]]:
+        inputs = list(examples.values())
+        graph, tensors = record(functools.partial(self._slot, taken), inputs)
+        return compile_recorded(graph, [*inputs, *tensors], beside_others=beside_others), tensors
+
+    @torch.no_grad()
+    def _slot(self, taken: tuple[bool, ...], *inputs: Tensor) -> None:
+        """What is recorded: one slot of all learners, with its update."""
+        given = dict(zip(self._names, inputs, strict=True))
+        flown = self._fly_slot(given)
+        self._store(as_transition(flown))
+        self._go_on(flown)
+        normals = given["losses"].unbind(dim=1) if "losses" in given else ()
+        with given_normals(iter(normals)):
+            self._update(self._sample(given["sampling"]), taken, given["corrections"])
+        self._totals["reward"].add_(flown["next", "reward"].squeeze(-1))
+
+    def _fly_slot(self, given: Mapping[str, Tensor]) -> TensorDictBase:
+        env, draws = self._env, self._env.base_env.draws
+        env.base_env.draws = _GivenDraws(given.get("fading"), given.get("tasks"))
+        try:
+            with given_normals(iter([given["exploration"]])):
+                action = self._algorithm.explorer(self._carrier.clone(False))
+            return env.step(action)
+        finally:
+            env.base_env.draws = draws
+
+    def _go_on(self, flown: TensorDictBase) -> None:
+        """What was the next observation is now the present one."""
+        following = self._env.step_mdp(flown)
+        for name, values in self._carrier.items():
+            values.copy_(following[name])
+
+    def _store(self, transition: TensorDictBase) -> None:
+        for name in TRANSITION:
+            self._storage[name].index_copy_(0, self._cursor, transition[name].unsqueeze(0))
+        capacity = self._replay.storage.max_size
+        self._cursor.copy_((self._cursor + 1) % capacity)
+        self._length.copy_((self._length + 1).clamp(max=capacity))
+
+    def _sample(self, uniform: Tensor) -> TensorDictBase:
+        slots = sampled_slots(uniform, self._length)
+        batch = TensorDict(batch_size=uniform.shape, device=self._env.device)
+        for name in TRANSITION:
+            batch[name] = self._storage[name][slots, self._learners]
+        return batch
+
+    def _update(self, batch: TensorDictBase, taken: tuple[bool, ...], corrections: Tensor) -> None:
+        for index, step in enumerate(self._algorithm.steps):
+            if not taken[index]:
+                continue
+            with torch.enable_grad():
                 loss = step.loss(batch.clone(False)).mean(dim=-1)  # losses write into it
-                adam.step(torch.autograd.grad(loss.sum(), adam.weights))
-                losses[step.name] = loss.detach()
-            for target, weight in targets:
-                target.lerp_(weight.data, rate)
-            return losses
+                adam = self._adam[step.name]
+                gradients = torch.autograd.grad(loss.sum(), adam.weights)
+            adam.step(gradients, *corrections[index])
+            self._totals[step.name].add_(loss.detach())
+        if taken[-1]:
+            for target, weight in self._targets:
+                target.lerp_(weight, 1.0 - self._algorithm.target.eps)  # tau
 
-        options: dict[str, Any] = {"cpp.use_decompose_tanh": True, "fallback_random": True}
-        return torch.compile(update, fullgraph=True, dynamic=False, options=options)
 
+class AdamState:
+    """Adam (Kingma and Ba, ICLR 2015) on the state of a :class:`torch.optim.Adam`.
 
-class _AdamState:
-    """Adam (Kingma and Ba, ICLR 2015) on the state of a :class:`torch.optim.Adam`."""
+    Args:
+        step: whose optimizer's state is made, where there is none yet, and used.
+    """
 
     def __init__(self, step: GradientStep) -> None:
         self.weights: list[Tensor] = []
         self._rows: list[tuple[Tensor, Tensor, Tensor, Tensor, float]] = []
         for group in step.optimizer.param_groups:
-            self._betas, self._eps = group["betas"], group["eps"]
+            self.betas, self._eps = group["betas"], group["eps"]
             for weight in group["params"]:
                 state = step.optimizer.state[weight]
                 if not state:
@@ -114,14 +253,21 @@ class _AdamState:
                 self.weights.append(weight)
                 self._rows.append((weight.data, *moments, state["step"], group["lr"]))
 
-    def step(self, gradients: tuple[Tensor, ...]) -> None:
-        """Move the weights against the gradients."""
-        (first, second), eps = self._betas, self._eps
-        for (weight, mean, square, count, rate), gradient in zip(
-            self._rows, gradients, strict=True
-        ):
-            count.add_(1.0)
-            mean.lerp_(gradient, 1.0 - first)
-            square.mul_(second).addcmul_(gradient, gradient, value=1.0 - second)
-            root = (square / (1.0 - second**count)).sqrt()
-            weight.sub_(rate / (1.0 - first**count) * mean / (root + eps))
+    def set_count(self, count: int) -> None:
+        """How many steps have been taken."""
+        for *_, steps, _ in self._rows:
+            steps.fill_(count)
+
+    def step(self, gradients: tuple[Tensor, ...], first: Tensor, second: Tensor) -> None:
+        """Move the weights against the gradients.
+
+        Args:
+            gradients: one for each of the weights.
+            first: bias correction of the gradients' mean.
+            second: and of their root mean square.
+        """
+        decay, square_decay = self.betas
+        for (weight, mean, square, _, rate), gradient in zip(self._rows, gradients, strict=True):
+            mean.lerp_(gradient, 1.0 - decay)
+            square.lerp_(gradient.square(), 1.0 - square_decay)
+            weight.sub_(rate * first * mean / (square.sqrt() * second + self._eps))

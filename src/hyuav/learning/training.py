@@ -1,24 +1,32 @@
-"""The training loop: Algorithm 1, for any algorithm and for many learners side by side."""
+"""The training of many learners: Algorithm 1 for any algorithm, its progress and its state."""
 
+import dataclasses
+import math
+import os
+import shutil
 import warnings
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import torch
-from tensordict import TensorDictBase
 from torch import Tensor
-from torchrl.collectors import Collector
 
-from hyuav.envs.transforms import make_env
 from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.compiled import COMPILATION_ERRORS, CompiledUpdate, pays
-from hyuav.learning.randomness import RandomStream
-from hyuav.learning.replay import as_transition, make_replay
-from hyuav.learning.weights import copy_weights, load_weights, replace_learners
+from hyuav.learning.cohort import Cohort, Learner
+from hyuav.learning.recording import COMPILATION_ERRORS
+from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
 from hyuav.parameters import Parameters, choice, count, parameter, switch
 from hyuav.scenario import Scenario
+
+COMPILE_SECONDS = 20.0
+"""What compiling the programs of one cohort takes, on a core of its own."""
+
+SECONDS_SAVED = (0.003, 0.0007)
+"""Saved per slot, and besides that per learner and slot."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +38,11 @@ class TrainingParameters(Parameters):
     batch_size: int = parameter(count(), 70, symbol="K")
     evaluation_every: int = parameter(count(), 10, unit="episode")
     evaluation_episodes: int = parameter(count(), 100)
+    evaluation_seed: int = parameter(count(0), 20_000)
     clock: bool = parameter(switch, False)
     compile: str = parameter(choice("auto", "always", "never"), "auto")
+    cohorts: int = parameter(count(), os.cpu_count() or 1)
+    """Groups in which the learners of one horizon are trained, each on a thread of its own."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -46,12 +57,12 @@ class Episode:
 
     number: int
     """Of the episode, from 1."""
-    slots: int
+    slots: tuple[int, ...]
     """Flown by each learner since training began."""
     accumulated_reward: Tensor
     """(N,) bps/Hz, with exploration and penalties, undiscounted."""
     losses: dict[str, Tensor]
-    """(N,) mean loss of the episode's updates, by gradient step."""
+    """(N,) mean loss of the episode's updates, by gradient step; NaN where there was none."""
     evaluation: Tensor | None
     """(N,) bps/Hz, noise-free accumulated reward, in the episodes that end with an evaluation."""
 
@@ -59,126 +70,148 @@ class Episode:
 class Training:
     """N independent learners in one process, each with its own weights, replay and noise.
 
-    The learners differ in their random numbers and, where ``schemes`` says so, in their scheme.
-    All that evolves is in :meth:`state_dict`. The random numbers are the training's own, so that
-    it gives the same numbers whatever else the process does.
+    The learners may differ in seed, scheme and horizon. All that evolves is in
+    :meth:`state_dict`. The random numbers are each learner's own, so that it learns the same
+    whatever the process does besides, up to the rounding of differently arranged sums.
 
     Args:
         scenario: node positions and parameters.
-        schemes: one of "hybrid", "relay" and "jamming" for each learner; N is their number.
+        learners: one or more.
         algorithm: which one, with its hyperparameters.
         parameters: how long and on what to learn.
-        seed: of all random numbers.
         device: of all tensors.
 
     Raises:
-        InputError: an unknown scheme or device, or a negative seed.
+        InputError: an unknown device.
         InputTypeError: an argument of the wrong type.
     """
 
     def __init__(
         self,
         scenario: Scenario,
-        schemes: Sequence[str],
+        learners: Sequence[Learner],
         algorithm: AlgorithmParameters,
         parameters: TrainingParameters,
-        seed: int = 0,
         device: torch.device | str | None = None,
     ) -> None:
-        if isinstance(schemes, str) or not schemes:
-            raise InputTypeError(rejection("schemes", schemes, "a list with one for each learner"))
+        of_learners = isinstance(learners, list | tuple) and all(
+            isinstance(learner, Learner) for learner in learners
+        )
+        if not of_learners or not learners:
+            raise InputTypeError(rejection("learners", learners, "a list of at least one Learner"))
         if not isinstance(algorithm, AlgorithmParameters):
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
-        learners, clock = len(schemes), parameters.clock
-        self.scenario, self.schemes, self.parameters = scenario, tuple(schemes), parameters
-        env = make_env(scenario, schemes, (learners,), device, seed, clock=clock)
-        self._evaluation_seed = (seed + 1) % 2**63
-        observation_size = env.observation_spec["observation"].shape[-1]
-        self._random = RandomStream(seed, env.device)
-        with env.device, self._random.active():
-            self.algorithm = algorithm.build(learners, observation_size)
-        self.replay = make_replay(
-            learners, parameters.replay_size, parameters.batch_size, env.device
-        )
-        self.collector = Collector(
-            env,
-            self.algorithm.explorer,
-            frames_per_batch=learners,
-            total_frames=-1,
-            trust_policy=True,
-            track_traj_ids=False,
-            auto_register_policy_transforms=False,
-        )
-        self._transitions = iter(self.collector)
-        self._compiled: CompiledUpdate | None = None
-        self.slots = self.updates = 0
-        self.best_evaluation = torch.full((learners,), -torch.inf, device=env.device)
-        self.best_weights = copy_weights(self.algorithm.loss)
+        self.scenario, self.parameters = scenario, parameters
+        self.learners = tuple(learners)
+        self._members = _partition(self.horizons, parameters.cohorts)
+        self.cohorts = [
+            Cohort(
+                dataclasses.replace(scenario, num_slots=self.horizons[members[0]]),
+                [learners[index] for index in members],
+                algorithm,
+                parameters.replay_size,
+                parameters.batch_size,
+                clock=parameters.clock,
+                device=device,
+            )
+            for members in self._members
+        ]
+        self._compiles = False
+
+    @property
+    def horizons(self) -> tuple[int, ...]:
+        """T of each learner."""
+        return tuple(learner.num_slots or self.scenario.num_slots for learner in self.learners)
 
     @property
     def episode(self) -> int:
         """How many episodes have been flown."""
-        return self.slots // self.scenario.num_slots
+        return self.cohorts[0].episode
+
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """Names of the algorithm's gradient steps."""
+        return tuple(step.name for step in self.cohorts[0].algorithm.steps)
+
+    @property
+    def best_evaluation(self) -> Tensor:
+        """(N,) bps/Hz, the best noise-free accumulated reward so far."""
+        return self._in_order([cohort.best_evaluation for cohort in self.cohorts])
+
+    @property
+    def best_weights(self) -> dict[str, Tensor]:
+        """The weights that reached it, of all learners."""
+        return self._join([cohort.best_weights for cohort in self.cohorts])
+
+    def _in_order(self, values: Sequence[Tensor]) -> Tensor:
+        """Values (n,) of each cohort as those of all learners (N,)."""
+        order = torch.tensor([index for members in self._members for index in members])
+        return torch.cat(list(values)).cpu()[order.argsort()]
+
+    def _join(self, weights: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
+        by_learner = {
+            index: select_learner(own, position)
+            for own, members in zip(weights, self._members, strict=True)
+            for position, index in enumerate(members)
+        }
+        return join_learners([by_learner[index] for index in range(len(self.learners))])
 
     def episodes(self) -> Iterator[Episode]:
         """Train until ``num_episodes`` are flown; report each episode as it ends."""
-        self._compiled = CompiledUpdate(self.algorithm) if self._compiling_pays() else None
-        while self.episode < self.parameters.num_episodes:
-            with self._random.active():
-                episode = self._train_episode()
-            yield episode
+        self._compiles = self._compiling_pays()
+        threads = min(len(self.cohorts), os.cpu_count() or 1)
+        with ThreadPoolExecutor(threads) as pool:
+            while self.episode < self.parameters.num_episodes:
+                yield self._train_episode(pool)
 
-    def _train_episode(self) -> Episode:
-        rewards, losses = [], []
-        for _ in range(self.scenario.num_slots):
-            transition = next(self._transitions)[:, 0]
-            rewards.append(transition["next", "reward"].squeeze(-1))
-            losses.append(self._learn(as_transition(transition)))
-            self.slots += 1
+    def _train_episode(self, pool: ThreadPoolExecutor) -> Episode:
+        if self._compiles and all(cohort.learns for cohort in self.cohorts):
+            self._compile()
+        if len(self.cohorts) > 1 and all(cohort.is_compiled for cohort in self.cohorts):
+            with _one_thread_each():
+                flown = list(pool.map(Cohort.fly, self.cohorts))
+        else:
+            flown = [cohort.fly() for cohort in self.cohorts]
+        rewards, losses = zip(*flown, strict=True)
         return Episode(
             number=self.episode,
-            slots=self.slots,
-            accumulated_reward=torch.stack(rewards).sum(dim=0),
-            losses=_mean(losses),
+            slots=tuple(self.episode * horizon for horizon in self.horizons),
+            accumulated_reward=self._in_order(rewards),
+            losses={name: self._in_order(_loss(losses, name, rewards)) for name in self.steps},
             evaluation=self._keep_best() if self._evaluation_is_due() else None,
         )
 
     def _compiling_pays(self) -> bool:
         if self.parameters.compile != "auto":
             return self.parameters.compile == "always"
-        slots = self.parameters.num_episodes * self.scenario.num_slots
-        return pays(slots - self.slots, len(self.schemes))
+        if shutil.which(os.environ.get("CXX", "g++")) is None:
+            return False
+        episodes = self.parameters.num_episodes - self.episode
+        per_slot, per_learner = SECONDS_SAVED
+        saved = sum(
+            episodes * cohort.scenario.num_slots * (per_slot + per_learner * len(cohort.learners))
+            for cohort in self.cohorts
+        )
+        kinds = {len(cohort.learners) for cohort in self.cohorts}
+        return saved > COMPILE_SECONDS * len(kinds)
 
-    def _learn(self, transition: TensorDictBase) -> dict[str, Tensor]:
-        """Lines 12 to 15 of Algorithm 1; the collector has gone through lines 3 to 11."""
-        self.replay.extend(transition.unsqueeze(0))
-        if len(self.replay) < self.parameters.batch_size:
-            return {}
-        batch = self.replay.sample()
-        self.updates += 1
-        return self._update(batch)
-
-    def _update(self, batch: TensorDictBase) -> dict[str, Tensor]:
-        """Lines 14 and 15, as one graph where it is compiled and can be."""
-        if self._compiled is not None:
-            try:
-                return self._compiled(batch, self.updates)
-            except COMPILATION_ERRORS as error:  # before any weight has changed
-                if self.parameters.compile == "always":
-                    raise
-                reason = " ".join(str(error).split())[:200]
-                warnings.warn(f"training goes on without compiling ({reason})", stacklevel=2)
-                self._compiled = None
-        losses = self.algorithm.update_networks(batch, self.updates)
-        self.algorithm.update_targets(self.updates)
-        return losses
+    def _compile(self) -> None:
+        try:
+            for cohort in self.cohorts:
+                cohort.compile(beside_others=len(self.cohorts) > 1)
+        except COMPILATION_ERRORS as error:
+            if self.parameters.compile == "always":
+                raise
+            reason = " ".join(str(error).split())[:200]
+            warnings.warn(f"training goes on without compiling ({reason})", stacklevel=2)
+            self._compiles = False
 
     def _evaluation_is_due(self) -> bool:
         last = self.episode == self.parameters.num_episodes
         return last or self.episode % self.parameters.evaluation_every == 0
 
     def evaluate(self, scheme: str | None = None) -> Tensor:
-        """Fly the current actors without noise, on the same fading draws every time.
+        """Fly the current actors without noise, all through the same fading every time.
 
         Args:
             scheme: that all learners fly; None for each learner's own.
@@ -186,38 +219,45 @@ class Training:
         Returns:
             (N,) mean accumulated reward in bps/Hz.
         """
-        env = make_env(
-            self.scenario,
-            self.schemes if scheme is None else scheme,
-            (len(self.schemes), self.parameters.evaluation_episodes),
-            self.collector.env.device,
-            self._evaluation_seed,
-            clock=self.parameters.clock,
-        )
-        with torch.no_grad():
-            flown = env.rollout(self.scenario.num_slots, self.algorithm.actor)
-        evaluation: Tensor = flown["next", "episode_reward"][..., -1, 0].mean(dim=-1)
-        return evaluation
+        return self._in_order(self._evaluate(scheme))
+
+    def _evaluate(self, scheme: str | None) -> list[Tensor]:
+        episodes, seed = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
+        return [cohort.evaluate(episodes, seed, scheme) for cohort in self.cohorts]
 
     def _keep_best(self) -> Tensor:
         """Evaluate; where a learner has never been better, its weights are the best so far."""
-        evaluation = self.evaluate()
-        better = evaluation > self.best_evaluation
-        self.best_evaluation = torch.where(better, evaluation, self.best_evaluation)
-        replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
-        return evaluation
+        evaluations = self._evaluate(None)
+        for cohort, evaluation in zip(self.cohorts, evaluations, strict=True):
+            cohort.keep_best(evaluation)
+        return self._in_order(evaluations)
 
-    def warm_start(self, weights: dict[str, Tensor]) -> None:
-        """Begin with the networks of an earlier training, the best so far until beaten.
+    def load_weights(self, weights: dict[str, Tensor]) -> None:
+        """Put weights into all learners' networks and targets.
 
         Args:
-            weights: of N learners, or of one, with which all then begin.
+            weights: of N learners, or of one, which serve all.
 
         Raises:
             InputError: the weights are of another algorithm, of other sizes or of another number
                 of learners.
         """
-        load_weights(self.algorithm.loss, weights)
+        for cohort, members in zip(self.cohorts, self._members, strict=True):
+            own = weights
+            if count_learners(weights) == len(self.learners):
+                own = join_learners([select_learner(weights, index) for index in members])
+            load_weights(cohort.algorithm.loss, own)
+
+    def warm_start(self, weights: dict[str, Tensor]) -> None:
+        """Begin with the networks of an earlier training, the best so far until beaten.
+
+        Args:
+            weights: as for :meth:`load_weights`.
+
+        Raises:
+            InputError: as :meth:`load_weights`.
+        """
+        self.load_weights(weights)
         self._keep_best()
 
     def state_dict(self) -> dict[str, Any]:
@@ -225,18 +265,7 @@ class Training:
 
         The tensors are the training's own; save them before it goes on.
         """
-        return {
-            "modules": self.algorithm.modules.state_dict(),
-            "optimizers": [step.optimizer.state_dict() for step in self.algorithm.steps],
-            "replay": self.replay.state_dict(),
-            "slot": self.collector._carrier.to_dict(),  # where the flight stands
-            "environment": self.collector.env.base_env.draws.state(),
-            "random": self._random.state,
-            "slots": self.slots,
-            "updates": self.updates,
-            "best_evaluation": self.best_evaluation,
-            "best_weights": self.best_weights,
-        }
+        return {"cohorts": [cohort.state_dict() for cohort in self.cohorts]}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue where :meth:`state_dict` was taken, in a training made with the same arguments.
@@ -245,25 +274,35 @@ class Training:
             InputError: the state is of another algorithm, learner axis or scenario.
         """
         try:
-            self.algorithm.modules.load_state_dict(state["modules"])
-            for step, optimizer in zip(self.algorithm.steps, state["optimizers"], strict=True):
-                step.optimizer.load_state_dict(optimizer)
-            self.replay.load_state_dict(state["replay"])
-            self.collector._carrier.update(state["slot"])
-            self.collector.env.base_env.draws.set_state(state["environment"])
-            self._random.state = state["random"]
-            self.slots, self.updates = state["slots"], state["updates"]
-            self.best_evaluation = state["best_evaluation"]
-            self.best_weights = state["best_weights"]
+            for cohort, own in zip(self.cohorts, state["cohorts"], strict=True):
+                cohort.load_state_dict(own)
         except (KeyError, RuntimeError, ValueError, TypeError, AttributeError) as error:
             reason = " ".join(str(error).split())
             raise InputError(f"checkpoint: not of a training like this one ({reason})") from None
 
 
-def _mean(losses: list[dict[str, Tensor]]) -> dict[str, Tensor]:
-    """Mean over an episode's updates of each gradient step's losses."""
-    names = {name for loss in losses for name in loss}
-    return {
-        name: torch.stack([loss[name] for loss in losses if name in loss]).mean(dim=0)
-        for name in sorted(names)
-    }
+def _partition(horizons: Sequence[int], cohorts: int) -> list[list[int]]:
+    """Group learners of equal horizon, and divide each group into near-equal parts."""
+    parts = []
+    for horizon in dict.fromkeys(horizons):
+        members = [index for index, own in enumerate(horizons) if own == horizon]
+        size = math.ceil(len(members) / cohorts)
+        parts += [members[start : start + size] for start in range(0, len(members), size)]
+    return parts
+
+
+def _loss(losses: Sequence[dict[str, Tensor]], name: str, like: Sequence[Tensor]) -> list[Tensor]:
+    """One gradient step's mean loss in each cohort, NaN in those that did not take it."""
+    missing = [torch.full_like(values, torch.nan) for values in like]
+    return [own.get(name, none) for own, none in zip(losses, missing, strict=True)]
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """While cohorts share the cores, none of them takes more than one."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)

@@ -11,10 +11,35 @@ from torch import Tensor
 from torchrl.objectives import LossModule
 
 from hyuav.errors import InputError
+from hyuav.randomness import derived_generator
 
 
 def _learner_axis(weights: Tensor) -> int:
     return -min(weights.ndim, 3)
+
+
+def draw_weights(loss: LossModule, seeds: Sequence[int]) -> None:
+    """Draw each learner's initial weights from its own seed, as PyTorch's linear layers are.
+
+    Targets begin as copies. A learner's temperature is left as it is.
+
+    Args:
+        loss: holding the networks of N learners.
+        seeds: of the N learners.
+    """
+    generators = [derived_generator(seed, "weights") for seed in seeds]
+    networks = dict(loss.named_parameters())
+    for name, values in networks.items():
+        layer, _, kind = name.rpartition(".")
+        if kind not in ("weight", "bias"):
+            continue
+        bound = networks[f"{layer}.weight"].shape[-2] ** -0.5
+        for learner, generator in enumerate(generators):
+            own = values.data.select(-3, learner)
+            own.copy_(torch.empty(own.shape).uniform_(-bound, bound, generator=generator))
+    for name, target in loss.named_buffers():
+        if name.startswith("target_"):
+            target.copy_(networks[name.removeprefix("target_")].data)
 
 
 def copy_weights(loss: LossModule) -> dict[str, Tensor]:
@@ -29,6 +54,12 @@ def replace_learners(weights: dict[str, Tensor], by: dict[str, Tensor], where: T
     for name, values in weights.items():
         mask = where.reshape(-1, *(1,) * (min(values.ndim, 3) - 1))
         values.copy_(torch.where(mask, by[name], values))
+
+
+def count_learners(weights: dict[str, Tensor]) -> int:
+    """Of how many learners the weights are."""
+    values = next(iter(weights.values()))
+    return values.shape[_learner_axis(values)]
 
 
 def select_learner(weights: dict[str, Tensor], learner: int) -> dict[str, Tensor]:

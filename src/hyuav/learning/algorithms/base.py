@@ -49,6 +49,8 @@ class GradientStep:
     optimizer: torch.optim.Optimizer
     every: int = 1
     """Taken in every n-th update."""
+    normals: int = 0
+    """Standard normal tensors (N, K, 2) that the loss draws."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,11 @@ class Algorithm:
     """theta' <- tau theta + (1 - tau) theta'."""
     target_every: int = 1
     """The targets follow in every n-th update."""
+
+    def due(self, index: int) -> tuple[bool, ...]:
+        """Which gradient steps the update of this index takes, and last whether targets follow."""
+        periods = (*(step.every for step in self.steps), self.target_every)
+        return tuple(index % period == 0 for period in periods)
 
     def update_networks(self, batch: TensorDictBase, index: int) -> dict[str, Tensor]:
         """Take the gradient steps, eq. 9 and 10 for DDPG, on one mini-batch of each learner.

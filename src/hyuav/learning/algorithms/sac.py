@@ -103,9 +103,12 @@ class SAC(AlgorithmParameters):
             loss=loss,
             steps=(
                 GradientStep(
-                    "critic", lambda batch: loss.qvalue_v2_loss(batch)[0], critic_optimizer
+                    "critic",
+                    lambda batch: loss.qvalue_v2_loss(batch)[0],
+                    critic_optimizer,
+                    normals=1,
                 ),
-                GradientStep("actor", loss.actor_and_temperature_loss, actor_optimizer),
+                GradientStep("actor", loss.actor_and_temperature_loss, actor_optimizer, normals=1),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
         )

@@ -43,7 +43,12 @@ class TD3(DDPG):
             explorer=TensorDictSequential(actor, noise),
             loss=loss,
             steps=(
-                GradientStep("critic", lambda batch: loss.value_loss(batch)[0], critic_optimizer),
+                GradientStep(
+                    "critic",
+                    lambda batch: loss.value_loss(batch)[0],
+                    critic_optimizer,
+                    normals=1,
+                ),
                 GradientStep(
                     "actor",
                     lambda batch: loss.actor_loss(batch)[0],

@@ -1,0 +1,250 @@
+"""Learners of one horizon side by side: Algorithm 1, one episode at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+from torchrl.collectors import Collector
+
+from hyuav.envs.transforms import make_env
+from hyuav.learning.algorithms import AlgorithmParameters
+from hyuav.learning.compiled import CompiledSlots
+from hyuav.learning.replay import as_transition, make_replay
+from hyuav.learning.weights import copy_weights, draw_weights, replace_learners
+from hyuav.parameters import Parameters, choice, count, optional, parameter
+from hyuav.randomness import RowStream, given_normals
+from hyuav.scenario import Scenario
+from hyuav.system import SCHEMES
+
+
+@dataclass(frozen=True)
+class Learner(Parameters):
+    """What distinguishes one learner from another.
+
+    All its random numbers come from its seed: initial weights, exploration, fading, sampling. So
+    it learns the same alone and among others, and learners of equal seeds that differ in scheme
+    or horizon begin with the same weights and meet the same luck.
+    """
+
+    scheme: str = parameter(choice(*SCHEMES), "hybrid")
+    seed: int = parameter(count(0), 0)
+    num_slots: int | None = parameter(optional(count()), None, symbol="T")
+    """The horizon; the scenario's where it is None."""
+
+
+class Cohort:
+    """N learners that share a horizon and nothing else.
+
+    Args:
+        scenario: node positions and parameters, with the learners' horizon.
+        learners: their schemes and seeds.
+        algorithm: which one, with its hyperparameters.
+        replay_size: transitions kept of each learner.
+        batch_size: K.
+        clock: whether they observe the slots flown.
+        device: of all tensors.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        learners: Sequence[Learner],
+        algorithm: AlgorithmParameters,
+        replay_size: int,
+        batch_size: int,
+        *,
+        clock: bool,
+        device: torch.device | str | None,
+    ) -> None:
+        self.scenario, self.learners, self.clock = scenario, tuple(learners), clock
+        self.batch_size = batch_size
+        seeds = [learner.seed for learner in learners]
+        schemes = [learner.scheme for learner in learners]
+        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, clock=clock)
+        observation_size = self.env.observation_spec["observation"].shape[-1]
+        with self.env.device:
+            self.algorithm = algorithm.build(len(seeds), observation_size)
+        draw_weights(self.algorithm.loss, seeds)
+        self._streams = self._random_streams(seeds)
+        self.replay = make_replay(
+            replay_size, batch_size, self._streams["sampling"], self.env.device
+        )
+        self.collector = Collector(
+            self.env,
+            self._explore,
+            frames_per_batch=len(seeds),
+            total_frames=-1,
+            trust_policy=True,
+            track_traj_ids=False,
+            auto_register_policy_transforms=False,
+        )
+        self._transitions = iter(self.collector)
+        self._compiled: CompiledSlots | None = None
+        self.episode = self.updates = 0
+        self.best_evaluation = torch.full((len(seeds),), -torch.inf, device=self.env.device)
+        self.best_weights = copy_weights(self.algorithm.loss)
+
+    def _random_streams(self, seeds: Sequence[int]) -> dict[str, RowStream]:
+        size, device = self.batch_size, self.env.device
+        normals = sum(step.normals for step in self.algorithm.steps)
+
+        def exploration(count: int, generator: torch.Generator) -> Tensor:
+            return torch.randn(count, 2, generator=generator)
+
+        def losses(count: int, generator: torch.Generator) -> Tensor:
+            return torch.randn(count, normals, size, 2, generator=generator)
+
+        def sampling(count: int, generator: torch.Generator) -> Tensor:
+            return torch.rand(count, size, generator=generator)
+
+        laws = {"exploration": exploration, "sampling": sampling}
+        if normals:
+            laws["losses"] = losses
+        return {name: RowStream(draw, seeds, name, device) for name, draw in laws.items()}
+
+    def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
+        with given_normals(self._streams["exploration"]):
+            return self.algorithm.explorer(tensordict)
+
+    @property
+    def learns(self) -> bool:
+        """Whether every slot of the next episode is followed by an update."""
+        return len(self.replay) + 1 >= self.batch_size
+
+    def compile(self, *, beside_others: bool) -> None:
+        """Fly from the next episode on by compiled programs; see :class:`CompiledSlots`.
+
+        Raises:
+            One of :data:`hyuav.learning.recording.COMPILATION_ERRORS`.
+        """
+        if self._compiled is None:
+            self._compiled = CompiledSlots(
+                self.env,
+                self.algorithm,
+                self.replay,
+                self.batch_size,
+                self.collector._carrier,
+                beside_others=beside_others,
+            )
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether the next episode is flown by compiled programs."""
+        return self._compiled is not None
+
+    def fly(self) -> tuple[Tensor, dict[str, Tensor]]:
+        """Fly and learn for one episode.
+
+        Returns:
+            the accumulated reward (N,) in bps/Hz, and each gradient step's mean loss (N,).
+        """
+        self.episode += 1
+        if self._compiled is None:
+            return self._fly_slots()
+        slots, draws = self.scenario.num_slots, self.env.base_env.draws
+        blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
+        if self.scenario.fading:
+            blocks["fading"] = draws.take_fading(slots)
+        if self.env.base_env.system.edge_can_saturate:
+            blocks["tasks"] = draws.take_tasks(slots)
+        carrier = self.collector._carrier
+        reward, losses = self._compiled.fly(carrier, blocks, self.updates)
+        self.updates += slots
+        carrier.update(self.env.reset())
+        return reward, losses
+
+    def _fly_slots(self) -> tuple[Tensor, dict[str, Tensor]]:
+        reward = torch.zeros(len(self.learners), device=self.env.device)
+        losses: list[dict[str, Tensor]] = []
+        for _ in range(self.scenario.num_slots):
+            transition = next(self._transitions)[:, 0]
+            reward += transition["next", "reward"].squeeze(-1)
+            self.replay.extend(as_transition(transition).unsqueeze(0))
+            if len(self.replay) >= self.batch_size:
+                losses.append(self._learn())
+        return reward, _mean(losses)
+
+    def _learn(self) -> dict[str, Tensor]:
+        """Lines 13 to 15 of Algorithm 1; the collector has gone through lines 3 to 11."""
+        batch = self.replay.sample()
+        self.updates += 1
+        if "losses" in self._streams:
+            normals = next(self._streams["losses"]).unbind(dim=1)
+            with given_normals(iter(normals)):
+                losses = self.algorithm.update_networks(batch, self.updates)
+        else:
+            losses = self.algorithm.update_networks(batch, self.updates)
+        self.algorithm.update_targets(self.updates)
+        return losses
+
+    @torch.no_grad()
+    def evaluate(self, episodes: int, seed: int, scheme: str | None = None) -> Tensor:
+        """Fly the current actors without noise, all of them through the same fading.
+
+        Args:
+            episodes: flown by each learner.
+            seed: of the fading.
+            scheme: that all learners fly; None for each learner's own.
+
+        Returns:
+            (N,) mean accumulated reward in bps/Hz.
+        """
+        env = make_env(
+            self.scenario,
+            self.env.base_env.schemes if scheme is None else scheme,
+            (len(self.learners), episodes),
+            self.env.device,
+            [seed] * len(self.learners),
+            clock=self.clock,
+        )
+        flown = env.rollout(self.scenario.num_slots, self.algorithm.actor)
+        evaluation: Tensor = flown["next", "episode_reward"][..., -1, 0].mean(dim=-1)
+        return evaluation
+
+    def keep_best(self, evaluation: Tensor) -> None:
+        """Where a learner was never better than ``evaluation`` (N,), its weights are the best."""
+        better = evaluation > self.best_evaluation
+        self.best_evaluation = torch.where(better, evaluation, self.best_evaluation)
+        replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything that evolves; the tensors are the cohort's own."""
+        return {
+            "modules": self.algorithm.modules.state_dict(),
+            "optimizers": [step.optimizer.state_dict() for step in self.algorithm.steps],
+            "replay": self.replay.state_dict(),
+            "slot": self.collector._carrier.to_dict(),  # where the flight stands
+            "environment": self.env.base_env.draws.state(),
+            "random": {name: stream.state() for name, stream in self._streams.items()},
+            "episode": self.episode,
+            "updates": self.updates,
+            "best_evaluation": self.best_evaluation,
+            "best_weights": self.best_weights,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue where :meth:`state_dict` was taken, in a cohort made with the same arguments."""
+        self._compiled = None  # its programs hold the optimizers' former tensors
+        self.algorithm.modules.load_state_dict(state["modules"])
+        for step, optimizer in zip(self.algorithm.steps, state["optimizers"], strict=True):
+            step.optimizer.load_state_dict(optimizer)
+        self.replay.load_state_dict(state["replay"])
+        self.collector._carrier.update(state["slot"])
+        self.env.base_env.draws.set_state(state["environment"])
+        for name, stream in self._streams.items():
+            stream.set_state(state["random"][name])
+        self.episode, self.updates = state["episode"], state["updates"]
+        self.best_evaluation = state["best_evaluation"]
+        self.best_weights = state["best_weights"]
+
+
+def _mean(losses: list[dict[str, Tensor]]) -> dict[str, Tensor]:
+    """Mean over an episode's updates of each gradient step's losses."""
+    names = {name for loss in losses for name in loss}
+    return {
+        name: torch.stack([loss[name] for loss in losses if name in loss]).mean(dim=0)
+        for name in sorted(names)
+    }

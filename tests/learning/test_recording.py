@@ -1,0 +1,64 @@
+import pytest
+import torch
+from torch import Tensor
+
+from hyuav.learning.recording import compile_recorded, record
+
+
+def test_what_a_function_does_is_recorded_and_not_done() -> None:
+    state, table = torch.zeros(3), torch.arange(6.0).reshape(3, 2)
+
+    def function(change: Tensor, row: Tensor) -> None:
+        state.add_(change)
+        table.index_copy_(0, row, state[:2].unsqueeze(0))
+
+    graph, tensors = record(function, [torch.ones(3), torch.tensor([1])])
+    assert torch.equal(state, torch.zeros(3))
+    assert {tensor.data_ptr() for tensor in tensors} == {state.data_ptr(), table.data_ptr()}
+    graph(torch.full((3,), 2.0), torch.tensor([2]), *tensors)
+    assert state.tolist() == [2.0, 2.0, 2.0]
+    assert table.tolist() == [[0.0, 1.0], [2.0, 3.0], [2.0, 2.0]]
+
+
+def test_a_parameter_and_its_data_are_one_tensor() -> None:
+    weight = torch.nn.Parameter(torch.ones(2, 2))
+
+    def descend(inputs: Tensor) -> None:
+        with torch.enable_grad():
+            loss = (inputs @ weight).square().sum()
+            (gradient,) = torch.autograd.grad(loss, [weight])
+        weight.data.sub_(0.1 * gradient)
+
+    inputs = torch.randn(5, 2)
+    graph, tensors = record(descend, [inputs])
+    assert len(tensors) == 1
+    expected = 1.0 - 0.2 * inputs.T @ (inputs @ torch.ones(2, 2))
+    with torch.no_grad():
+        graph(inputs, *tensors)
+    torch.testing.assert_close(weight.data, expected)
+
+
+def test_a_decision_on_numbers_is_refused() -> None:
+    state = torch.zeros(3)
+
+    def function(change: Tensor) -> None:
+        if bool((change > 0).any()):
+            state.add_(change)
+
+    with pytest.raises(RuntimeError):
+        record(function, [torch.ones(3)])
+
+
+@pytest.mark.parametrize("beside_others", [False, True])
+def test_a_compiled_graph_serves_any_tensors_of_its_shapes(beside_others: bool) -> None:
+    state = torch.zeros(3)
+
+    def function(change: Tensor) -> None:
+        state.add_(change.tanh())
+
+    graph, tensors = record(function, [torch.ones(3)])
+    program = compile_recorded(graph, [torch.ones(3), *tensors], beside_others=beside_others)
+    other, change = torch.ones(3), torch.tensor([0.1, -2.0, 30.0])
+    program(change, other)
+    torch.testing.assert_close(other, 1.0 + change.tanh())
+    assert torch.equal(state, torch.zeros(3))
