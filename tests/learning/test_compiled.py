@@ -65,7 +65,7 @@ def test_compiled_slots_are_the_eager_ones_up_to_rounding(name: str, scenario: S
             trained.fly()
     assert other.learns
     before = tensors(other)
-    other.compile(beside_others=False)
+    other.compile()
     after = tensors(other)
     assert all(torch.equal(before[key], after[key]) for key in before)  # recording does nothing
     for _ in range(9):  # beyond the end of the replay

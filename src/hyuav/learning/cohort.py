@@ -114,7 +114,7 @@ class Cohort:
         """Whether every slot of the next episode is followed by an update."""
         return len(self.replay) + 1 >= self.batch_size
 
-    def compile(self, *, beside_others: bool) -> None:
+    def compile(self) -> None:
         """Fly from the next episode on by compiled programs; see :class:`CompiledSlots`.
 
         Raises:
@@ -127,7 +127,6 @@ class Cohort:
                 self.replay,
                 self.batch_size,
                 self.collector._carrier,
-                beside_others=beside_others,
             )
 
     @property

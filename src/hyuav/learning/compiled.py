@@ -9,8 +9,7 @@ training may change over between any two episodes and a checkpoint serves both.
 
 import functools
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -19,12 +18,10 @@ from torchrl.data import ReplayBuffer
 from torchrl.envs import TransformedEnv
 
 from hyuav.learning.algorithms import Algorithm, GradientStep
-from hyuav.learning.recording import compile_recorded, record
+from hyuav.learning.recording import compile_function
 from hyuav.learning.replay import TRANSITION, as_transition, sampled_slots
 from hyuav.randomness import given_normals
 from hyuav.system import Tasks
-
-Program = Callable[..., Any]
 
 
 class _GivenDraws:
@@ -50,7 +47,6 @@ class CompiledSlots:
         replay: which holds at least one transition.
         batch_size: K.
         carrier: what the helpers observe, (N,); an example.
-        beside_others: whether other threads run programs at the same time.
 
     Raises:
         One of :data:`hyuav.learning.recording.COMPILATION_ERRORS`.
@@ -63,8 +59,6 @@ class CompiledSlots:
         replay: ReplayBuffer,
         batch_size: int,
         carrier: TensorDictBase,
-        *,
-        beside_others: bool,
     ) -> None:
         self._env, self._algorithm, self._replay = env, algorithm, replay
         observed = (*env.observation_spec.keys(), *env.done_keys)
@@ -88,7 +82,7 @@ class CompiledSlots:
         self._names = tuple(examples)
         period = math.lcm(*(step.every for step in algorithm.steps), algorithm.target_every)
         self._programs = {
-            taken: self._compile(taken, examples, beside_others=beside_others)
+            taken: compile_function(functools.partial(self._slot, taken), [*examples.values()])
             for taken in {algorithm.due(index) for index in range(1, period + 1)}
         }
 
@@ -116,8 +110,7 @@ class CompiledSlots:
             rows = zip(*(blocks[name] for name in self._names), strict=True)
             for slot, inputs in enumerate(rows):
                 taken = self._algorithm.due(updates + slot + 1)
-                program, tensors = self._programs[taken]
-                program(*inputs, *tensors)
+                self._programs[taken](*inputs)
                 for name, due in zip(counts, taken, strict=False):
                     counts[name] += due
         self._end(updates + slots, slots)
@@ -166,13 +159,6 @@ class CompiledSlots:
         if system.edge_can_saturate:
             shapes["tasks"] = (learners, 2, num_ues)
         return {name: torch.zeros(shape, device=device) for name, shape in shapes.items()}
-
-    def _compile(
-        self, taken: tuple[bool, ...], examples: dict[str, Tensor], *, beside_others: bool
-    ) -> tuple[Program, list[Tensor]]:
-        inputs = list(examples.values())
-        graph, tensors = record(functools.partial(self._slot, taken), inputs)
-        return compile_recorded(graph, [*inputs, *tensors], beside_others=beside_others), tensors
 
     @torch.no_grad()
     def _slot(self, taken: tuple[bool, ...], *inputs: Tensor) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
+from tensordict.nn import CudaGraphModule
 from torch import Tensor
 from torch._dynamo.exc import BackendCompilerFailed
 from torch._inductor.exc import InductorError
@@ -17,7 +18,7 @@ from torch.fx import GraphModule
 from torch.fx.experimental.proxy_tensor import make_fx
 
 COMPILATION_ERRORS = (BackendCompilerFailed, InductorError)
-"""What :func:`compile_recorded` raises where there is no working compiler."""
+"""What :func:`compile_function` raises where there is no working compiler."""
 
 
 def record(
@@ -59,23 +60,27 @@ def record(
     return GraphModule(torch.nn.Module(), traced.graph), tensors
 
 
-def compile_recorded(
-    graph: GraphModule, arguments: Sequence[Tensor], *, beside_others: bool
-) -> Callable[..., Any]:
-    """Make one program of a recorded graph; arguments of other values may be given to it.
+def compile_function(
+    function: Callable[..., None], inputs: Sequence[Tensor]
+) -> Callable[..., None]:
+    """A function that does what ``function`` does, compiled for the shapes of ``inputs``.
+
+    On a CPU it is one C++ program, which other threads need not wait for; on a GPU one CUDA graph.
 
     Args:
-        graph: from :func:`record`.
-        arguments: all that it takes.
-        beside_others: whether other threads run programs at the same time.
+        function: see :func:`record`.
+        inputs: examples of what it takes.
 
     Raises:
         One of :data:`COMPILATION_ERRORS`.
     """
-    options: dict[str, Any] = {
-        "cpp.use_decompose_tanh": True,
-        "cpp.threads": 1,
-        "cpp_wrapper": beside_others,  # so that it runs without Python's lock
-    }
+    graph, tensors = record(function, inputs)
+    on_cpu = all(tensor.device.type == "cpu" for tensor in tensors)
+    options: dict[str, Any] = {"cpp.use_decompose_tanh": True, "cpp_wrapper": on_cpu}
     with torch.no_grad():
-        return torch._inductor.compile(graph, list(arguments), options=options)
+        program = torch._inductor.compile(graph, [*inputs, *tensors], options=options)
+
+    def run(*values: Tensor) -> None:
+        program(*values, *tensors)
+
+    return run if on_cpu else CudaGraphModule(run)

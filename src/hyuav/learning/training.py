@@ -198,7 +198,7 @@ class Training:
     def _compile(self) -> None:
         try:
             for cohort in self.cohorts:
-                cohort.compile(beside_others=len(self.cohorts) > 1)
+                cohort.compile()
         except COMPILATION_ERRORS as error:
             if self.parameters.compile == "always":
                 raise
