@@ -76,11 +76,30 @@ def compile_function(
     """
     graph, tensors = record(function, inputs)
     on_cpu = all(tensor.device.type == "cpu" for tensor in tensors)
-    options: dict[str, Any] = {"cpp.use_decompose_tanh": True, "cpp_wrapper": on_cpu}
-    with torch.no_grad():
-        program = torch._inductor.compile(graph, [*inputs, *tensors], options=options)
+    try:
+        program = _compile(graph, [*inputs, *tensors], on_cpu, trust_compiler=True)
+    except COMPILATION_ERRORS:
+        program = _compile(graph, [*inputs, *tensors], on_cpu, trust_compiler=False)
 
     def run(*values: Tensor) -> None:
         program(*values, *tensors)
 
     return run if on_cpu else CudaGraphModule(run)
+
+
+def _compile(
+    graph: GraphModule, arguments: Sequence[Tensor], on_cpu: bool, *, trust_compiler: bool
+) -> Callable[..., Any]:
+    """Let Inductor compile, with options that are measured in docs/performance.md.
+
+    A compiler that is trusted to know this processor's instructions need not prove it, which
+    takes a third of the time.
+    """
+    options: dict[str, Any] = {
+        "cpp_wrapper": on_cpu,
+        "cpp.use_decompose_tanh": True,
+        "cpp.vec_isa_ok": True if trust_compiler else None,
+        "pattern_matcher": False,
+    }
+    with torch.no_grad():
+        return torch._inductor.compile(graph, list(arguments), options=options)
