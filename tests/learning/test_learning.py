@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 import torch
+from scipy import stats
 
 from hyuav import Scenario
 from hyuav.learning.algorithms import ALGORITHMS
@@ -30,3 +31,30 @@ def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
     list(training.episodes())
     optimum = solve(EASY, ["jamming"], resolution=2.0)["jamming"].value
     assert training.best_evaluation.median().item() > 0.85 * optimum
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+def test_learning_curves_do_not_depend_on_how_fast_they_are_made(name: str) -> None:
+    """Compiled and side by side, or eager and alone: the same seeds learn the same, in the mean.
+
+    Rounding differs, and grows in the course of a training until single episodes differ. So it
+    is the curves' means over many episodes and seeds that are compared.
+    """
+    torch.set_num_threads(1)
+    algorithm = ALGORITHMS[name](hidden_sizes=(64, 64), actor_learning_rate=1e-3)
+    learners = [Learner("hybrid", seed) for seed in range(8)]
+    parameters = TrainingParameters(num_episodes=45, evaluation_every=45, evaluation_episodes=20)
+
+    def curves(group: list[Learner], how: str) -> torch.Tensor:
+        changed = dataclasses.replace(parameters, compile=how)
+        episodes = Training(EASY, group, algorithm, changed).episodes()
+        return torch.stack([episode.accumulated_reward for episode in episodes])
+
+    fast = curves(learners, "always")
+    eager = torch.cat([curves([learner], "never") for learner in learners], dim=1)
+    torch.testing.assert_close(fast[:8], eager[:8], rtol=0.05, atol=0.05)  # hardly any updates yet
+    for part in (slice(0, 15), slice(15, 30), slice(30, 45)):
+        one, other = (each[part].mean(dim=0).numpy() for each in (fast, eager))
+        low, high = stats.t.interval(0.95, len(one) - 1, one.mean(), stats.sem(one))
+        assert low <= other.mean() <= high
