@@ -108,7 +108,9 @@ def one_or_more(element: Converter, accepted: str) -> Converter:
     several = sequence(element, accepted)
 
     def convert(name: str, value: Any) -> tuple[Any, ...]:
-        return several(name, value if isinstance(value, list | tuple) else [value])
+        if isinstance(value, list | tuple):
+            return several(name, value)
+        return (element(name, value),)
 
     return convert
 

@@ -39,6 +39,18 @@ def test_training_keeps_a_run(call: Call, tmp_path: Path) -> None:
     assert metrics["learner"].unique().tolist() == [0, 1]
 
 
+def test_schemes_horizons_and_seeds_train_as_one_run(call: Call, tmp_path: Path) -> None:
+    call("train", "scheme=[hybrid,jamming]", "num_slots=[3,6]", "learners=2", "seed=5", *TINY)
+    (run,) = (tmp_path / "runs").iterdir()
+    learners = RunDirectory(run).configuration().learners
+    expected = [(s, t, n) for s in ("hybrid", "jamming") for t in (3, 6) for n in (5, 6)]
+    assert [(own.scheme, own.num_slots, own.seed) for own in learners] == expected
+    last = RunDirectory(run).metrics().tail(8)
+    assert list(zip(last["scheme"], last["num_slots"], last["seed"], strict=True)) == expected
+    assert (last["slots"] == 4 * last["num_slots"]).all()
+    assert last["best_evaluation"].notna().all()
+
+
 @pytest.mark.parametrize("algorithm", ["ddpg", "td3", "sac"])
 def test_one_word_swaps_the_algorithm(call: Call, tmp_path: Path, algorithm: str) -> None:
     call("train", f"algorithm={algorithm}", *TINY)
@@ -150,6 +162,8 @@ REFUSALS = [
     (["train", "scenario.num_slots=0"], "num_slots = 0: expected a whole number >= 1"),
     (["train", "scheme=both"], "scheme = 'both': expected one of hybrid, relay, jamming"),
     (["train", "seed=-3"], "seed = -3: expected a whole number >= 0"),
+    (["train", "num_slots=[10,0]"], "num_slots[1] = 0: expected a whole number >= 1"),
+    (["train", "scheme=[relay,relay]"], "expected learners that differ"),
     (["train", "seed="], "seed = '': expected a whole number >= 0"),
     (["train", "algorithm.discount=1.5"], "discount = 1.5: expected a number in [0, 1]"),
     (["train", "training.num_episodes=1.5"], "num_episodes = 1.5: expected a whole number >= 1"),
