@@ -2,8 +2,10 @@
 
 python recipes/evaluate.py run=runs/NAME
 python recipes/evaluate.py run=[runs/HYBRID,runs/RELAY,runs/JAMMING]
+python recipes/evaluate.py run=runs/NAME num_slots=10
 """
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +26,8 @@ class Evaluate(Parameters):
     """What to evaluate and where to."""
 
     run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "run directories")), None)
+    num_slots: int | None = parameter(optional(count()), None, symbol="T")
+    """The horizon, of whose learners the runs must have some; the scenario's where it is None."""
     output: str | None = parameter(optional(text), None)
     device: str = parameter(text, "cpu")
     threads: int = parameter(count(), 1)
@@ -50,16 +54,19 @@ def main(config: Config, _: Path) -> None:
     for run in runs[1:]:
         if run.configuration().scenario != first.scenario:
             raise InputError(rejection("run", str(run.path), f"the scenario of {runs[0].path}"))
+    scenario = first.scenario
+    if options.num_slots is not None:
+        scenario = dataclasses.replace(scenario, num_slots=options.num_slots)
     console = Console()
     output = runs[0].path if options.output is None else Path(options.output)
     require_writable("output", output / "figures")
     policies = {
-        **learned_policies(runs, first.scenario),
-        **reference_policies(first.scenario, parameters.resolution, console),
+        **learned_policies(runs, scenario),
+        **reference_policies(scenario, parameters.resolution, console),
     }
-    evaluation = evaluate(first.scenario, first.scenario_name, policies, parameters, options.device)
+    evaluation = evaluate(scenario, first.scenario_name, policies, parameters, options.device)
     evaluation.save(output)
-    save_figure(flight_map(first.scenario, evaluation.flights), output / "figures", "flight_map")
+    save_figure(flight_map(scenario, evaluation.flights), output / "figures", "flight_map")
     print_results(evaluation, console)
     console.print(f"evaluation: {output}", soft_wrap=True)
 

@@ -350,11 +350,8 @@ def fly(env: Any, state: Any, action: Any) -> Any:
 def next_draws(env: Any) -> tuple[list[list[float] | None], list[list[float]]]:
     """The fading powers and CPU cycles, by row, that the environment is about to draw."""
     state = env.draws.state()
-    fading_rng, task_rng = torch.Generator(), torch.Generator()
-    fading_rng.set_state(state["fading"])
-    task_rng.set_state(state["tasks"])
-    fading = env.system.draw_fading(env.batch_size, fading_rng)
-    cycles = env.system.draw_tasks(env.batch_size, task_rng).cpu_cycles.flatten(0, -2)
+    fading, cycles = env.draws.fading(), env.draws.tasks().cpu_cycles.flatten(0, -2)
+    env.draws.set_state(state)
     powers: list[list[float] | None] = [None] * len(cycles)
     if fading is not None:
         powers = [as_list(row) for row in fading.flatten(0, -2)]

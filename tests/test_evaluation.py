@@ -38,7 +38,7 @@ def policies() -> dict[str, list[Policy]]:
     return {
         "re_lt": [Policy(re_lt(SCENARIO))],
         "ja_lt": [Policy(ja_lt(SCENARIO))],
-        "proposed": [Policy(LearnedPolicy(SCENARIO, algorithm, weights, i)) for i in range(2)],
+        "proposed": [Policy(LearnedPolicy(SCENARIO, algorithm, weights, range(2)), 2)],
         **{
             OPTIMA[rule]: [Policy(FlightPolicy(optimum.path, SCENARIO))]
             for rule, optimum in optima.items()
@@ -74,16 +74,49 @@ def test_all_schemes_fly_through_the_same_fading() -> None:
     everywhere = SCENARIO.helper_start
     still = dataclasses.replace(SCENARIO, eavesdropper_position=everywhere)
     hovering = Policy(ja_lt(still))
-    twice = [fly(still, scheme, hovering, 5, 3) for scheme in ("ja_lt", "optimum")]
+    few = EvaluationParameters(episodes=5, flights=5, seed=3)
+    twice = [fly(still, scheme, hovering, few).slots for scheme in ("ja_lt", "optimum")]
     for rates in ("relay_sum_rate", "jamming_sum_rate"):
         first, second = (flown["diagnostics", rates] for flown in twice)
         assert torch.equal(first, second)
 
 
+def test_all_learners_fly_through_the_same_fading() -> None:
+    twins = Policy(ja_lt(SCENARIO), 2)
+    first, second = fly(SCENARIO, "ja_lt", twins, FEW).totals["secrecy_sum_rate"]
+    assert torch.equal(first, second)
+
+
+def test_a_learner_earns_among_others_what_it_earns_alone() -> None:
+    algorithm = DDPG(hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(3, 15).loss)
+    among = Policy(LearnedPolicy(SCENARIO, algorithm, weights, [2, 0]), 2)
+    alone = Policy(LearnedPolicy(SCENARIO, algorithm, weights, [0]))
+    torch.testing.assert_close(
+        fly(SCENARIO, "proposed", among, FEW).totals["secrecy_sum_rate"][1:],
+        fly(SCENARIO, "proposed", alone, FEW).totals["secrecy_sum_rate"],
+    )
+
+
+def test_the_totals_are_sums_over_the_slots_of_an_episode() -> None:
+    every = EvaluationParameters(episodes=6, flights=6)
+    flown = fly(SCENARIO, "optimum", Policy(re_lt(SCENARIO)), every)
+    diagnostics = flown.slots["diagnostics"]
+    for name, per_slot in (
+        ("secrecy_sum_rate", secrecy_sum_rate(flown.slots)),
+        ("relay_share", flown.slots["mode"].squeeze(-1)),
+        ("offloading_share", diagnostics["offloading"].double().mean(dim=-1)),
+        ("ue_energy", diagnostics["ue_energy"].mean(dim=-1)),
+        ("helper_energy", diagnostics["helper_energy"].squeeze(-1)),
+    ):
+        expected = per_slot.double().sum(dim=-1)
+        torch.testing.assert_close(flown.totals[name][0], expected, rtol=1e-5, atol=1e-6)
+
+
 def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> None:
     leaving = dataclasses.replace(SCENARIO, eavesdropper_position=(-100.0, -100.0))
     policy = Policy(ja_lt(dataclasses.replace(leaving, num_slots=3)))
-    flown = fly(leaving, "ja_lt", policy, 4, 0)
+    flown = fly(leaving, "ja_lt", policy, EvaluationParameters(episodes=4, flights=4)).slots
     assert flown["off_map"].any()
     torch.testing.assert_close(
         secrecy_sum_rate(flown), flown["diagnostics", "jamming_sum_rate"].squeeze(-1)

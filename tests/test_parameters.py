@@ -101,7 +101,7 @@ def test_one_value_or_a_list_of_them_is_kept_as_a_tuple(value: Any, kept: tuple[
 def test_of_one_or_more_values_every_one_is_checked() -> None:
     convert = one_or_more(count(), "whole numbers")
     refused(convert, [], "whole numbers", InputError)
-    with pytest.raises(InputTypeError, match=r"^field\[0\] = 'two': expected a whole number >= 1$"):
+    with pytest.raises(InputTypeError, match=r"^field = 'two': expected a whole number >= 1$"):
         convert("field", "two")
     with pytest.raises(InputError, match=r"^field\[1\] = 0: expected a whole number >= 1$"):
         convert("field", [1, 0])

@@ -12,6 +12,7 @@ import torch
 from scipy import stats
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 
 from hyuav.envs.transforms import make_env
 from hyuav.errors import InputError, rejection, require_choice
@@ -66,7 +67,9 @@ class Policy:
     """A way to fly and what it needs to observe."""
 
     module: TensorDictModuleBase
-    """Writes ``action`` (..., 2)."""
+    """Writes ``action`` (learners, ..., 2)."""
+    learners: int = 1
+    """How many it flies, each in one row."""
     clock: bool = False
     """Whether ``observation`` carries the slots flown."""
 
@@ -115,18 +118,14 @@ def evaluate(
     if not policies:
         raise InputError(rejection("policies", policies, "at least one scheme"))
     flown = {
-        scheme: torch.stack(
-            [
-                fly(scenario, scheme, policy, parameters.episodes, parameters.seed, device)
-                for policy in policies[scheme]
-            ]
+        scheme: _together(
+            [fly(scenario, scheme, policy, parameters, device) for policy in policies[scheme]]
         )
         for scheme in LABELS
         if scheme in policies
     }
     returns = {
-        scheme: secrecy_sum_rate(data).sum(dim=-1).double().numpy()
-        for scheme, data in flown.items()
+        scheme: flights.totals["secrecy_sum_rate"].numpy() for scheme, flights in flown.items()
     }
     summary = {
         "scenario": name,
@@ -135,11 +134,23 @@ def evaluate(
         "episodes": parameters.episodes,
         "seed": parameters.seed,
         "schemes": {
-            scheme: _returns(returns, scheme) | _account(data) for scheme, data in flown.items()
+            scheme: _returns(returns, scheme) | _account(flights.totals, scenario)
+            for scheme, flights in flown.items()
         },
     }
-    rows = [slot_table(scheme, data[0, : parameters.flights]) for scheme, data in flown.items()]
+    rows = [slot_table(scheme, flights.slots) for scheme, flights in flown.items()]
     return Evaluation(summary, pd.concat(rows, ignore_index=True))
+
+
+@dataclass(frozen=True)
+class Flights:
+    """What the flights of one scheme brought, on the CPU."""
+
+    totals: dict[str, Tensor]
+    """Sums over the slots of each episode, as :func:`_per_slot` names them: (learners, episodes)
+    float64."""
+    slots: TensorDictBase
+    """What followed each slot of the first learner's first episodes: (flights, T)."""
 
 
 @torch.no_grad()
@@ -147,19 +158,52 @@ def fly(
     scenario: Scenario,
     scheme: str,
     policy: Policy,
-    episodes: int,
-    seed: int,
+    parameters: EvaluationParameters,
     device: torch.device | str | None = None,
-) -> TensorDictBase:
-    """What follows each slot of ``episodes`` flights, with diagnostics: (episodes, T)."""
+) -> Flights:
+    """Fly all learners of a policy through the same episodes, with diagnostics."""
+    batch_size, seeds = (policy.learners, parameters.episodes), [parameters.seed] * policy.learners
     env = make_env(
-        scenario, MODE_RULES[scheme], (episodes,), device, seed, True, clock=policy.clock
+        scenario, MODE_RULES[scheme], batch_size, device, seeds, True, clock=policy.clock
     )
-    return env.rollout(scenario.num_slots, policy.module.to(env.device))["next"].cpu()
+    module = policy.module.to(env.device)
+    totals: dict[str, Tensor] = {}
+    state, slots = env.reset(), []
+    for _ in range(scenario.num_slots):
+        flown = env.step(module(state))
+        for name, values in _per_slot(flown["next"]).items():
+            totals[name] = totals[name] + values if name in totals else values.double()
+        slots.append(flown["next"][0, : parameters.flights].cpu())
+        state = env.step_mdp(flown)
+    return Flights(
+        {name: values.cpu() for name, values in totals.items()}, torch.stack(slots, dim=1)
+    )
 
 
-def secrecy_sum_rate(flown: TensorDictBase) -> torch.Tensor:
-    """The secrecy sum-rate of each slot, without penalty: (episodes, T) bps/Hz."""
+def _together(several: Sequence[Flights]) -> Flights:
+    """The flights of all learners, with the slots of the first."""
+    names = several[0].totals
+    totals = {name: torch.cat([flights.totals[name] for flights in several]) for name in names}
+    return Flights(totals, several[0].slots)
+
+
+def _per_slot(after: TensorDictBase) -> dict[str, Tensor]:
+    """How the helper flew and what each node spent in one slot: (learners, episodes)."""
+    diagnostics = after["diagnostics"]
+    return {
+        "secrecy_sum_rate": secrecy_sum_rate(after),
+        "relay_share": after["mode"].squeeze(-1),
+        "offloading_share": diagnostics["offloading"].float().mean(dim=-1),
+        "off_map": after["off_map"].squeeze(-1),
+        "budget_violations": diagnostics["budget_violation"].squeeze(-1),
+        "ue_energy": diagnostics["ue_energy"].mean(dim=-1),
+        "edge_energy": diagnostics["edge_energy"].squeeze(-1),
+        "helper_energy": diagnostics["helper_energy"].squeeze(-1),
+    }
+
+
+def secrecy_sum_rate(flown: TensorDictBase) -> Tensor:
+    """The secrecy sum-rate of a slot, without penalty: (...) bps/Hz."""
     return flown["diagnostics", "secrecy_rate"].sum(dim=-1)
 
 
@@ -197,23 +241,13 @@ def confidence_interval(returns: Array) -> list[float]:
     return [float(bound) for bound in interval]
 
 
-def _account(flown: TensorDictBase) -> dict[str, Any]:
-    """How the helper flew and what each node spent, per episode: (learners, episodes, T)."""
-    diagnostics = flown["diagnostics"]
-    per_episode = {
-        "off_map": flown["off_map"],
-        "budget_violations": diagnostics["budget_violation"],
-        "ue_energy": diagnostics["ue_energy"].mean(dim=-1, keepdim=True),
-        "edge_energy": diagnostics["edge_energy"],
-        "helper_energy": diagnostics["helper_energy"],
-    }
+def _account(totals: Mapping[str, Tensor], scenario: Scenario) -> dict[str, Any]:
+    """How the helper flew and what each node spent, per episode; shares are of all slots."""
+    per_episode = {name: float(values.mean()) for name, values in totals.items()}
+    del per_episode["secrecy_sum_rate"]
     return {
-        "relay_share": float(flown["mode"].double().mean()),
-        "offloading_share": float(diagnostics["offloading"].double().mean()),
-        **{
-            name: float(values.double().sum(dim=(-2, -1)).mean())
-            for name, values in per_episode.items()
-        },
+        name: value / scenario.num_slots if name.endswith("_share") else value
+        for name, value in per_episode.items()
     }
 
 
@@ -238,7 +272,7 @@ def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
     }
     table = pd.DataFrame(
         {
-            name: values.flatten().numpy() if isinstance(values, torch.Tensor) else values
+            name: values.flatten().numpy() if isinstance(values, Tensor) else values
             for name, values in columns.items()
         }
     )

@@ -137,19 +137,25 @@ def select_initial_weights(
 
 
 def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[str, list[Policy]]:
-    """The best actors of trainings, as Proposed, Re-OT and Ja-OT.
+    """The best actors of trainings for the scenario's horizon, as Proposed, Re-OT and Ja-OT.
 
     Raises:
-        InputError: a run or its checkpoint cannot be read, or its actors observe another number
-            of UEs than the scenario has.
+        InputError: a run or its checkpoint cannot be read, its actors observe another number of
+            UEs than the scenario has, or none was trained for the horizon.
     """
     policies: dict[str, list[Policy]] = {}
     for run in runs:
         configuration, weights = run.configuration(), run.best_weights()
         clock = configuration.training.clock
+        by_scheme: dict[str, list[int]] = {}
         for index, learner in enumerate(configuration.learners):
-            module = LearnedPolicy(scenario, configuration.algorithm, weights, index, clock=clock)
-            policies.setdefault(LEARNED[learner.scheme], []).append(Policy(module, clock))
+            if (learner.num_slots or configuration.scenario.num_slots) == scenario.num_slots:
+                by_scheme.setdefault(LEARNED[learner.scheme], []).append(index)
+        for scheme, indices in by_scheme.items():
+            module = LearnedPolicy(scenario, configuration.algorithm, weights, indices, clock=clock)
+            policies.setdefault(scheme, []).append(Policy(module, len(indices), clock))
+    if not policies:
+        raise InputError(f"num_slots = {scenario.num_slots}: no learner was trained for it")
     return policies
 
 

@@ -82,6 +82,7 @@ class SecureOffloadingSystem:
         ground = channel.k_factor_from_db(scenario.ground_to_air_k_factor)
         air = channel.k_factor_from_db(scenario.air_to_air_k_factor)
         self._k_factor = self._tensor([ground] * (3 * scenario.num_ues) + [air] * 2)
+        self.fading_law = channel.RicianFading.of(self._k_factor)
         jamming_coverage = offloading.covered_by_legitimate(
             ue_to_legitimate, scenario.coverage_radius
         )
@@ -169,15 +170,22 @@ class SecureOffloadingSystem:
 
     def draw_tasks(self, shape: tuple[int, ...], generator: torch.Generator) -> Tasks:
         """One slot's tasks, uniform over the parameter ranges."""
-        uniform = torch.rand(
+        size, cycles_per_bit = torch.rand(
             (2, *shape, self.scenario.num_ues),
             generator=generator,
             dtype=self.dtype,
             device=self.device,
         )
+        return self.tasks_of(size, cycles_per_bit)
+
+    def tasks_of(self, size: Tensor, cycles_per_bit: Tensor) -> Tasks:
+        """The tasks at levels (..., U) of their ranges: 0 the smallest, 1 the largest."""
         ranges = (self.scenario.task_size, self.scenario.cycles_per_bit)
         return Tasks(
-            *(low + (high - low) * u for (low, high), u in zip(ranges, uniform, strict=True))
+            *(
+                low + (high - low) * level
+                for (low, high), level in zip(ranges, (size, cycles_per_bit), strict=True)
+            )
         )
 
     def mean_tasks(self, shape: tuple[int, ...]) -> Tasks:

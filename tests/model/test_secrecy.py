@@ -14,10 +14,15 @@ from hyuav.model import secrecy
 from hyuav.model.secrecy import AchievableRates, ChannelGains
 
 GAIN = st.floats(-14.0, -2.0).map(lambda exponent: 10.0**exponent)
+SNR = st.floats(-6.0, 6.0).map(lambda exponent: 10.0**exponent)
 POWER = st.floats(-5.0, 1.0).map(lambda exponent: 10.0**exponent)
 
 # The first UE of two_clusters with the helper at (-40, -40).
 FIRST_UE = (1.465416e-09, 9.377344e-10, 3.795931e-10, 3.125e-08, 3.289474e-09)
+
+
+def both(rates: AchievableRates) -> tuple[torch.Tensor, torch.Tensor]:
+    return rates.legitimate, rates.eavesdropper
 
 
 def gains_of(*values: float, dtype: torch.dtype = torch.float64) -> ChannelGains:
@@ -29,9 +34,9 @@ def test_the_rates_of_the_first_ue_of_two_clusters(dtype: torch.dtype) -> None:
     gains = gains_of(*FIRST_UE, dtype=dtype)
     relay = secrecy.relay_rates(gains, 0.1, 0.012, 1e-13)
     jamming = secrecy.jamming_rates(gains, 0.1, 0.08, 1e-13)
-    found = [float(rate) for rates in (relay, jamming) for rate in rates]
+    found = [float(rate) for rates in (relay, jamming) for rate in both(rates)]
     assert found == pytest.approx([4.937287, 4.799333, 0.082177, 0.194327], rel=5e-6)
-    assert {rate.dtype for rates in (relay, jamming) for rate in rates} == {dtype}
+    assert {rate.dtype for rates in (relay, jamming) for rate in both(rates)} == {dtype}
 
 
 @given(st.tuples(GAIN, GAIN, GAIN, GAIN, GAIN), POWER, POWER, st.floats(-16.0, -9.0))
@@ -56,7 +61,7 @@ def test_the_rates_are_those_of_the_rate_table(
         (reference.JAMMING, secrecy.jamming_rates(gains, ue_power, helper_power, noise)),
     ):
         expected = reference.rates(scenario, expected_gains, 0, mode)
-        assert [float(rate) for rate in found] == pytest.approx(expected, rel=1e-9, abs=1e-14)
+        assert [float(rate) for rate in both(found)] == pytest.approx(expected, rel=1e-9, abs=1e-14)
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -86,7 +91,7 @@ def test_without_transmit_power_there_is_no_rate() -> None:
         secrecy.relay_rates(gains_of(*FIRST_UE), 0.0, 0.0, 1e-13),
         secrecy.jamming_rates(gains_of(*FIRST_UE), 0.0, 0.0, 1e-13),
     ):
-        assert [float(rate) for rate in rates] == [0.0, 0.0]
+        assert [float(rate) for rate in both(rates)] == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("power", [1e-4, 0.08, 3.0])
@@ -100,8 +105,24 @@ def test_jamming_hurts_the_receiver_it_reaches_better(power: float) -> None:
 
 
 def test_the_secrecy_rate_is_never_negative() -> None:
-    rates = AchievableRates(torch.tensor([3.0, 1.0, 2.0]), torch.tensor([1.0, 3.0, 2.0]))
+    rates = AchievableRates(torch.tensor([7.0, 1.0, 3.0]), torch.tensor([1.0, 7.0, 3.0]), 1.0)
     assert secrecy.secrecy_rate(rates).tolist() == [2.0, 0.0, 0.0]
+
+
+@given(SNR, SNR, st.sampled_from([0.5, 1.0]))
+def test_the_secrecy_rate_is_the_difference_of_the_rates(
+    legitimate: float, eavesdropper: float, time_share: float
+) -> None:
+    snrs = torch.tensor([[legitimate], [eavesdropper]], dtype=torch.float64)
+    rates = AchievableRates(snrs[0], snrs[1], time_share)
+    difference = float(rates.legitimate - rates.eavesdropper)
+    found = float(secrecy.secrecy_rate(rates))
+    assert found == pytest.approx(max(difference, 0.0), rel=1e-9, abs=1e-12)
+
+
+def test_two_strong_signals_differ_exactly_in_float32() -> None:
+    rates = AchievableRates(torch.tensor(1.0e9 + 64.0), torch.tensor(1.0e9), 1.0)
+    assert float(secrecy.secrecy_rate(rates)) == pytest.approx(64e-9 / math.log(2), rel=1e-3)
 
 
 def test_only_offloading_ues_add_to_the_secrecy_sum_rate() -> None:
@@ -115,8 +136,8 @@ def test_rates_are_differentiable_in_every_gain(mode: Callable[..., AchievableRa
     # In units where gains are of order one; noise follows.
     values = [torch.tensor([v], dtype=torch.float64, requires_grad=True) for v in (2, 3, 5, 7, 11)]
 
-    def rates(*gains: torch.Tensor) -> AchievableRates:
-        return mode(ChannelGains(*gains), 1.3, 0.7, 0.5)
+    def rates(*gains: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return both(mode(ChannelGains(*gains), 1.3, 0.7, 0.5))
 
     assert torch.autograd.gradcheck(rates, values)
 

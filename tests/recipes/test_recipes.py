@@ -49,6 +49,13 @@ def test_schemes_horizons_and_seeds_train_as_one_run(call: Call, tmp_path: Path)
     assert list(zip(last["scheme"], last["num_slots"], last["seed"], strict=True)) == expected
     assert (last["slots"] == 4 * last["num_slots"]).all()
     assert last["best_evaluation"].notna().all()
+    call(
+        "evaluate", f"run={run}", "num_slots=6", "evaluation.episodes=4", "evaluation.resolution=5"
+    )
+    summary = json.loads((run / "evaluation.json").read_text())
+    assert summary["num_slots"] == 6
+    assert summary["schemes"]["ja_ot"]["learners"] == 2
+    assert "re_ot" not in summary["schemes"]
 
 
 @pytest.mark.parametrize("algorithm", ["ddpg", "td3", "sac"])

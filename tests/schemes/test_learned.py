@@ -31,6 +31,17 @@ def test_a_learner_acts_as_it_did_in_training() -> None:
     torch.testing.assert_close(policy(observed.clone())["action"][1], expected)
 
 
+def test_several_learners_fly_a_row_each() -> None:
+    algorithm = ALGORITHMS["sac"](hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(3, 15).loss)
+    together = LearnedPolicy(SCENARIO, algorithm, weights, [2, 0])
+    observed = make_env(SCENARIO, batch_size=(2, 4)).reset()
+    actions = together(observed.clone())["action"]
+    for row, learner in enumerate([2, 0]):
+        alone = LearnedPolicy(SCENARIO, algorithm, weights, learner)
+        torch.testing.assert_close(actions[row], alone(observed[row].clone())["action"])
+
+
 def test_an_actor_of_other_ues_is_refused() -> None:
     algorithm = ALGORITHMS["ddpg"](hidden_sizes=(8,))
     weights = copy_weights(algorithm.build(1, 15).loss)

@@ -1,32 +1,162 @@
 """What is random in the environment: one draw of fading and tasks for each slot."""
 
+import math
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import torch
 from torch import Tensor
 
-from hyuav.randomness import RowStream
+from hyuav.model.channel import RicianFading
+from hyuav.randomness import derived_generator
 from hyuav.system import SecureOffloadingSystem, Tasks
 
+GAMMA, MIX_1, MIX_2 = -0x61C8864680B583EB, -0x40A7B892E31B1A47, -0x6B2FB644ECCEEE15
+"""The constants of SplitMix64, as signed numbers."""
 
-class Draws(Protocol):
-    """Where an environment takes its random numbers from."""
+NUMBERS_AT_ONCE = 2**14
+"""Drawn for as many slots as this suffices for, but at least one."""
+
+NAMES = ("fading", "tasks")
+
+
+def splitmix64(state: Tensor) -> Tensor:
+    """The 64 random bits of each state (...) int64; the states of a sequence are GAMMA apart.
+
+    Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014. Any
+    number of a sequence can be had without those before it, in a few operations that a compiler
+    fuses with what the number is used for.
+    """
+    state = (state ^ _shifted(state, 30)) * MIX_1
+    state = (state ^ _shifted(state, 27)) * MIX_2
+    return state ^ _shifted(state, 31)
+
+
+def _shifted(bits: Tensor, count: int) -> Tensor:
+    return (bits >> count) & ((1 << (64 - count)) - 1)
+
+
+class Draws:
+    """The random numbers of an environment.
+
+    Each number depends on its seed and its place alone: slot, row and link or task. So it does
+    not matter how many are drawn at once, and devices differ only in rounding.
+
+    Args:
+        system: whose fading and tasks are drawn.
+        seeds: of D groups of helpers.
+        inner: shape of each group.
+    """
+
+    def __init__(
+        self, system: SecureOffloadingSystem, seeds: Sequence[int], inner: torch.Size
+    ) -> None:
+        self._system, self._rank = system, 1 + len(inner)
+        keys = [[derived_generator(seed, name).initial_seed() for seed in seeds] for name in NAMES]
+        self._keys = self._tensor(keys).reshape(len(NAMES), len(seeds), *(1 for _ in inner))
+        num_ues, device = system.scenario.num_ues, system.device
+        per_slot = len(seeds) * inner.numel() * (3 * num_ues + 2)
+        self._at_once = max(NUMBERS_AT_ONCE // per_slot, 1)
+        self._places = {}
+        for name, width in zip(NAMES, (3 * num_ues + 2, 2 * num_ues), strict=True):
+            columns = torch.arange(1, width + 1, device=device).reshape(-1, *(1,) * self._rank)
+            helpers = torch.arange(inner.numel(), device=device).reshape(inner)
+            self._places[name] = columns * GAMMA, helpers * width * GAMMA, inner.numel() * width
+        trailing = (1,) * self._rank
+        self._law = RicianFading(*(values.reshape(-1, *trailing) for values in system.fading_law))
+        self._slots = dict.fromkeys(NAMES, 0)
+        self._blocks: dict[str, tuple[int, Tensor]] = {}
+
+    def _tensor(self, values: object) -> Tensor:
+        return torch.tensor(values, device=self._system.device)
 
     def fading(self) -> Tensor | None:
         """The next slot's fading powers: (*batch_size, 3 U + 2), or None where fading is off."""
+        return self._spread(self._next("fading")) if self._system.scenario.fading else None
 
     def tasks(self) -> Tasks:
         """The next slot's tasks, each (*batch_size, U)."""
+        return self._as_tasks(self._spread(self._next("tasks")))
+
+    def take_fading(self, count: int) -> Tensor | None:
+        """The fading of the next ``count`` slots: (count, *batch_size, 3 U + 2)."""
+        return self._spread(self._take("fading", count)) if self._system.scenario.fading else None
+
+    def take_tasks(self, count: int) -> Tensor:
+        """The tasks of the next ``count`` slots: (count, rows, 2, ..., U), sizes and cycles."""
+        levels = self._spread(self._take("tasks", count))
+        return torch.stack(self._as_tasks(levels), dim=2)
+
+    def ticket(self, *, tasks: bool) -> tuple[Tensor, Tensor]:
+        """What decides the next slot's fading and, if wanted, tasks; it counts as drawn."""
+        slots = self._tensor([*self._slots.values()])
+        self._slots["fading"] += self._system.scenario.fading
+        self._slots["tasks"] += tasks
+        return self._keys, slots
+
+    def redeem(self, keys: Tensor, slots: Tensor) -> tuple[Tensor | None, Tasks]:
+        """The fading and tasks of a ticket, by tensor operations that a graph can record."""
+        fading = None
+        if self._system.scenario.fading:
+            fading = self._spread(self._numbers("fading", keys[0], slots[0]))
+        return fading, self._as_tasks(self._spread(self._numbers("tasks", keys[1], slots[1])))
 
     def state(self) -> dict[str, Any]:
         """Where the random numbers stand, for :meth:`set_state`."""
+        return {"keys": self._keys.cpu(), **self._slots}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Continue where :meth:`state` was taken."""
+        """Continue where :meth:`state` was taken from draws of as many groups."""
+        self._keys = state["keys"].to(self._keys.device).reshape(self._keys.shape)
+        self._slots = {name: int(state[name]) for name in NAMES}
+        self._blocks.clear()
+
+    def _spread(self, numbers: Tensor) -> Tensor:
+        """From the numbers of groups (..., D, *inner, k) to the batch's (..., *batch_size, k)."""
+        raise NotImplementedError
+
+    def _next(self, name: str) -> Tensor:
+        """The next slot's numbers, several slots of which are drawn at once."""
+        block, place = divmod(self._slots[name], self._at_once)
+        drawn, numbers = self._blocks.get(name, (-1, self._keys))
+        if drawn != block:
+            slot, self._slots[name] = self._slots[name], block * self._at_once
+            numbers = self._take(name, self._at_once)
+            self._blocks[name], self._slots[name] = (block, numbers), slot
+        self._slots[name] += 1
+        return numbers[place]
+
+    def _take(self, name: str, count: int) -> Tensor:
+        first = self._slots[name]
+        self._slots[name] += count
+        slots = torch.arange(first, first + count, device=self._keys.device)
+        slots = slots.reshape(-1, 1, *(1,) * self._rank)
+        return self._numbers(name, self._keys[NAMES.index(name)], slots).contiguous()
+
+    def _numbers(self, name: str, keys: Tensor, slots: Tensor) -> Tensor:
+        """Fading powers or task levels (..., D, *inner, width) of slots (..., 1, *1).
+
+        The helpers are the last dimension until the end: a long loop for a compiler.
+        """
+        column, helper, per_slot = self._places[name]
+        bits = splitmix64(helper + (keys + slots * per_slot * GAMMA) + column)
+        numbers = self._powers(bits) if name == "fading" else self._levels(bits)
+        return numbers.movedim(-1 - self._rank, -1)
+
+    def _powers(self, bits: Tensor) -> Tensor:
+        # 31 bits decide the level, so that the smallest is well below float32's 2^-24.
+        level = ((bits >> 32 & 0x7FFFFFFF).to(self._system.dtype) + 0.5) * 2.0**-31
+        angle = (bits & 0xFFFFFFFF).to(self._system.dtype) * (2.0 * math.pi * 2.0**-32)
+        return self._law.power(level, angle)
+
+    def _levels(self, bits: Tensor) -> Tensor:
+        return (bits >> 40 & 0xFFFFFF).to(self._system.dtype) * 2.0**-24
+
+    def _as_tasks(self, levels: Tensor) -> Tasks:
+        return self._system.tasks_of(*levels.chunk(2, dim=-1))
 
 
-class BatchDraws:
+class BatchDraws(Draws):
     """One seed for the whole batch.
 
     Args:
@@ -36,39 +166,20 @@ class BatchDraws:
     """
 
     def __init__(self, system: SecureOffloadingSystem, batch_size: torch.Size, seed: int) -> None:
-        self._system, self._batch_size = system, batch_size
-        root = torch.Generator().manual_seed(seed)
-        seeds = torch.randint(2**62, (2,), generator=root).tolist()
-        self._fading, self._tasks = (
-            torch.Generator(system.device).manual_seed(each) for each in seeds
-        )
+        super().__init__(system, [seed], batch_size)
 
-    def fading(self) -> Tensor | None:
-        """See :meth:`Draws.fading`."""
-        return self._system.draw_fading(self._batch_size, self._fading)
-
-    def tasks(self) -> Tasks:
-        """See :meth:`Draws.tasks`."""
-        return self._system.draw_tasks(self._batch_size, self._tasks)
-
-    def state(self) -> dict[str, Any]:
-        """See :meth:`Draws.state`."""
-        return {"fading": self._fading.get_state(), "tasks": self._tasks.get_state()}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """See :meth:`Draws.set_state`."""
-        self._fading.set_state(state["fading"])
-        self._tasks.set_state(state["tasks"])
+    def _spread(self, numbers: Tensor) -> Tensor:
+        return numbers.squeeze(-1 - self._rank)
 
 
-class RowDraws:
+class RowDraws(Draws):
     """A seed for each row of the batch's first dimension.
 
     A row's numbers depend on its own seed alone, so rows of equal seeds fly through the same
     fading and a row keeps its numbers whatever other rows there are.
 
     Args:
-        system: whose fading and tasks are drawn; on the CPU, whatever the device.
+        system: whose fading and tasks are drawn.
         batch_size: of the helpers flown at once, of at least one dimension.
         seeds: of the rows.
     """
@@ -76,43 +187,17 @@ class RowDraws:
     def __init__(
         self, system: SecureOffloadingSystem, batch_size: torch.Size, seeds: Sequence[int]
     ) -> None:
-        on_cpu = SecureOffloadingSystem(system.scenario, "cpu", system.dtype)
-        inner = batch_size[1:]
+        distinct = list(dict.fromkeys(seeds))
+        super().__init__(system, distinct, batch_size[1:])
+        self._rows = torch.tensor([distinct.index(seed) for seed in seeds], device=system.device)
 
-        def fading(count: int, generator: torch.Generator) -> Tensor:
-            powers = on_cpu.draw_fading((count, *inner), generator)
-            return torch.empty(count, 0) if powers is None else powers
-
-        def tasks(count: int, generator: torch.Generator) -> Tensor:
-            return torch.stack(on_cpu.draw_tasks((count, *inner), generator), dim=1)
-
-        self._faded = system.scenario.fading
-        self._streams = {
-            "fading": RowStream(fading, seeds, "fading", system.device),
-            "tasks": RowStream(tasks, seeds, "tasks", system.device),
-        }
-
-    def fading(self) -> Tensor | None:
-        """See :meth:`Draws.fading`."""
-        return next(self._streams["fading"]) if self._faded else None
-
-    def tasks(self) -> Tasks:
-        """See :meth:`Draws.tasks`."""
-        return Tasks(*next(self._streams["tasks"]).unbind(dim=1))
-
-    def take_fading(self, count: int) -> Tensor | None:
-        """The fading of the next ``count`` slots: (count, *batch_size, 3 U + 2)."""
-        return self._streams["fading"].take(count) if self._faded else None
-
-    def take_tasks(self, count: int) -> Tensor:
-        """The tasks of the next ``count`` slots: (count, rows, 2, ..., U), sizes and cycles."""
-        return self._streams["tasks"].take(count)
-
-    def state(self) -> dict[str, Any]:
-        """See :meth:`Draws.state`."""
-        return {name: stream.state() for name, stream in self._streams.items()}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """See :meth:`Draws.set_state`."""
-        for name, stream in self._streams.items():
-            stream.set_state(state[name])
+    def _spread(self, numbers: Tensor) -> Tensor:
+        axis = numbers.ndim - 1 - self._rank
+        groups = numbers.shape[axis]
+        if groups == len(self._rows):
+            return numbers
+        if groups == 1:  # the same memory for all rows
+            return numbers.expand(
+                *numbers.shape[:axis], len(self._rows), *numbers.shape[axis + 1 :]
+            )
+        return numbers.index_select(axis, self._rows)

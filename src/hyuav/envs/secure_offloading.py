@@ -78,7 +78,7 @@ class SecureOffloadingEnv(EnvBase):
         scheme: str | Sequence[str] = "hybrid",
         batch_size: int | Sequence[int] = (),
         device: torch.device | str | None = None,
-        seed: int | Sequence[int] | None = None,
+        seed: int | list[int] | tuple[int, ...] | None = None,
         diagnostics: bool = False,
     ) -> None:
         super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
@@ -100,6 +100,11 @@ class SecureOffloadingEnv(EnvBase):
     def scenario(self) -> Scenario:
         """The scenario that is flown."""
         return self.system.scenario
+
+    @property
+    def draws_tasks(self) -> bool:
+        """Whether a slot's tasks are drawn: for diagnostics, or because the edge may be full."""
+        return self.diagnostics or self.system.edge_can_saturate
 
     def _per_row(self, values: Tensor) -> Tensor:
         """Rows of values (1, k) or (rows, k), shaped to broadcast against (*batch_size, k)."""
@@ -146,16 +151,19 @@ class SecureOffloadingEnv(EnvBase):
         self.draws = BatchDraws(self.system, self.batch_size, as_seed(seed))
 
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
-        position = None if tensordict is None else tensordict.get("position", None)
-        if position is None:
-            position = self.system.helper_start.expand(*self.batch_size, 2).clone()
-        else:
-            position = self._checked_position(position)
+        position = self.start(tensordict)
         slot = self._slot(position)
         after_reset = self._observation(slot, torch.zeros_like(slot.relay_mode))
         if self.diagnostics:
             after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
         return after_reset
+
+    def start(self, tensordict: TensorDictBase | None) -> Tensor:
+        """Where a reset that is given ``tensordict`` puts the helpers: (*batch_size, 2) m."""
+        position = None if tensordict is None else tensordict.get("position", None)
+        if position is None:
+            return self.system.helper_start.expand(*self.batch_size, 2).clone()
+        return self._checked_position(position)
 
     def _checked_position(self, position: Tensor) -> Tensor:
         expected, half = (*self.batch_size, 2), self.scenario.map_side / 2
@@ -191,9 +199,7 @@ class SecureOffloadingEnv(EnvBase):
     def _slot(self, position: Tensor) -> Slot:
         """Lines 6 to 11 of Algorithm 1 with the helper at ``position`` (*batch_size, 2) m."""
         fading = self.draws.fading()
-        tasks = None
-        if self.diagnostics or self.system.edge_can_saturate:
-            tasks = self.draws.tasks()
+        tasks = self.draws.tasks() if self.draws_tasks else None
         distances = self.system.distances(position)
         gains = self.system.channel_gains(distances, fading)
         admission = tasks if self.system.edge_can_saturate else None

@@ -4,16 +4,10 @@ from collections.abc import Sequence
 
 import torch
 from tensordict import TensorDictBase
-from torchrl.envs import (
-    CatTensors,
-    Compose,
-    ObservationNorm,
-    RewardSum,
-    StepCounter,
-    Transform,
-    TransformedEnv,
-)
+from torchrl.data import Composite, Unbounded
+from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
+from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.parameters import switch
 from hyuav.scenario import Scenario
@@ -39,30 +33,48 @@ class OffMapPenalty(Transform):
         return next_tensordict
 
 
-def normalized_observation(scenario: Scenario, *, clock: bool) -> list[Transform]:
+class NormalizedObservation(Transform):
     """Gather ``observation`` (U + 5,) and bring each entry to order one by constants alone.
 
     Coordinates are divided by half the map's side, the mode becomes -1 (jamming) or 1 (relay),
     and distances from 0 to the map's side become -1 to 1. With a clock, the slots flown follow
     as one more entry from -1 (none) to 1 (all).
+
+    Args:
+        scenario: its map and horizon.
+        clock: append the slots flown.
     """
-    half, distances = scenario.map_side / 2, scenario.num_ues + 2
-    entries = ["position", "mode", "distances"]
-    loc = [0.0, 0.0, 0.5, *[half] * distances]
-    scale = [half, half, 0.5, *[half] * distances]
-    if clock:
-        entries.append("step_count")
-        loc.append(scenario.num_slots / 2)
-        scale.append(scenario.num_slots / 2)
-    return [
-        CatTensors(entries, "observation", sort=False, del_keys=False),
-        ObservationNorm(
-            torch.tensor(loc),
-            torch.tensor(scale),
-            in_keys=["observation"],
-            standard_normal=True,
-        ),
-    ]
+
+    def __init__(self, scenario: Scenario, *, clock: bool) -> None:
+        keys = ["position", "mode", "distances", *(["step_count"] if clock else [])]
+        super().__init__(in_keys=keys, out_keys=["observation"])
+        self._size = scenario.num_ues + 5 + clock
+        self._half_side = scenario.map_side / 2
+        self._half_horizon = scenario.num_slots / 2 if clock else None
+
+    def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the observation beside the entries that it is made of."""
+        parts = [
+            next_tensordict["position"] / self._half_side,
+            next_tensordict["mode"] * 2.0 - 1.0,
+            next_tensordict["distances"] * (1.0 / self._half_side) - 1.0,
+        ]
+        if self._half_horizon is not None:
+            parts.append(next_tensordict["step_count"] / self._half_horizon - 1.0)
+        next_tensordict["observation"] = torch.cat(parts, dim=-1)
+        return next_tensordict
+
+    def _reset(self, _: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
+        """Observe the start as well."""
+        return self._call(tensordict_reset)
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        """Add the observation to the specs."""
+        shape = (*observation_spec.shape, self._size)
+        observation_spec["observation"] = Unbounded(
+            shape, dtype=torch.float32, device=observation_spec.device
+        )
+        return observation_spec
 
 
 def make_env(
@@ -70,10 +82,11 @@ def make_env(
     scheme: str | Sequence[str] = "hybrid",
     batch_size: int | Sequence[int] = (),
     device: torch.device | str | None = None,
-    seed: int | Sequence[int] | None = None,
+    seed: int | list[int] | tuple[int, ...] | None = None,
     diagnostics: bool = False,
     *,
     clock: bool = False,
+    compiled: bool = False,
 ) -> TransformedEnv:
     """The environment as a learner sees it: :class:`SecureOffloadingEnv` with its transforms.
 
@@ -90,19 +103,22 @@ def make_env(
         seed: of fading and tasks, one for all or one per row.
         diagnostics: compute the ``diagnostics`` entry too.
         clock: append the slots flown to ``observation``, which then has U + 6 entries.
+        compiled: run each slot as one compiled graph, which takes half a minute in the first step
+            and pays for batches of thousands that fly thousands of slots.
 
     Raises:
         InputError: as :class:`SecureOffloadingEnv`.
     """
     switch("clock", clock)
     env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics)
-    return TransformedEnv(
+    kind = CompiledEnv if switch("compiled", compiled) else TransformedEnv
+    return kind(
         env,
         Compose(
             OffMapPenalty(env.scenario.off_map_penalty),
             RewardSum(),
             StepCounter(max_steps=env.scenario.num_slots),
-            *normalized_observation(env.scenario, clock=clock),
+            NormalizedObservation(env.scenario, clock=clock),
         ),
         device=env.device,
     )

@@ -11,8 +11,8 @@ from torchrl.collectors import Collector
 
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.compiled import CompiledSlots
 from hyuav.learning.replay import as_transition, make_replay
+from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import copy_weights, draw_weights, replace_learners
 from hyuav.parameters import Parameters, choice, count, optional, parameter
 from hyuav.randomness import RowStream, given_normals

@@ -3,6 +3,9 @@
 All functions take tensors with any leading batch shape (written ``...``), in float32 or float64.
 """
 
+import math
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
@@ -47,14 +50,49 @@ def k_factor_from_db(k_factor_db: float) -> float:
     return float(10.0 ** (k_factor_db / 10.0))
 
 
-def rician_power(
-    k_factor: Tensor, shape: tuple[int, ...], generator: torch.Generator | None = None
-) -> Tensor:
-    r"""Draw small-scale fading as a power, \|gamma\|^2 with unit mean (text below eq. 3).
+class RicianFading(NamedTuple):
+    r"""The law of the fading power \|gamma\|^2 (text below eq. 3), which has unit mean.
 
     gamma = sqrt(K / (K + 1)) + sqrt(1 / (K + 1)) n with n circularly symmetric complex
     Gaussian of unit variance. An equation multiplies a power gain by gamma, so it is the
     squared magnitude that enters.
+    """
+
+    line_of_sight: Tensor
+    """K / (K + 1): (...) power of the direct path."""
+    scatter: Tensor
+    """1 / (K + 1): (...) mean power of the scattered paths."""
+    cross: Tensor
+    """(...) twice the product of both amplitudes."""
+
+    @classmethod
+    def of(cls, k_factor: Tensor) -> "RicianFading":
+        """The law for K as a power ratio (...)."""
+        line_of_sight, scatter = k_factor / (k_factor + 1.0), 1.0 / (k_factor + 1.0)
+        return cls(line_of_sight, scatter, 2.0 * (line_of_sight * scatter).sqrt())
+
+    def power(self, level: Tensor, angle: Tensor) -> Tensor:
+        """The power of a draw, with n = sqrt(-ln(level)) e^(j angle) (Box and Muller, 1958).
+
+        Args:
+            level: uniform in (0, 1].
+            angle: uniform over a full turn, in rad.
+
+        Returns:
+            the shape to which these and K broadcast, dimensionless.
+        """
+        scattered = -level.log()
+        return (
+            self.line_of_sight
+            + self.scatter * scattered
+            + (self.cross * scattered.sqrt() * angle.cos())
+        )
+
+
+def rician_power(
+    k_factor: Tensor, shape: tuple[int, ...], generator: torch.Generator | None = None
+) -> Tensor:
+    """Draw fading powers of the law :class:`RicianFading`.
 
     Args:
         k_factor: K as a power ratio, broadcast against ``shape``; fixes dtype and device.
@@ -64,9 +102,7 @@ def rician_power(
     Returns:
         ``shape``, dimensionless.
     """
-    line_of_sight = (k_factor / (k_factor + 1.0)).sqrt()
-    scatter = (0.5 / (k_factor + 1.0)).sqrt()
-    normal = torch.randn(
+    level, turn = torch.rand(
         (2, *shape), generator=generator, dtype=k_factor.dtype, device=k_factor.device
     )
-    return (line_of_sight + scatter * normal[0]).square() + (scatter * normal[1]).square()
+    return RicianFading.of(k_factor).power(1.0 - level, 2.0 * math.pi * turn)

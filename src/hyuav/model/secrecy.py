@@ -23,17 +23,29 @@ class ChannelGains(NamedTuple):
 
 
 class AchievableRates(NamedTuple):
-    """What the legitimate and the eavesdropper UAV can receive, in bps/Hz."""
+    """What the legitimate and the eavesdropper UAV can receive."""
 
-    legitimate: Tensor
-    """R^d_u: (..., U)."""
-    eavesdropper: Tensor
-    """R^e_u: (..., U)."""
+    legitimate_snr: Tensor
+    """(..., U), at the end of the link that decides."""
+    eavesdropper_snr: Tensor
+    """(..., U)."""
+    time_share: float
+    """Of the UE's share of the slot in which the UE itself sends."""
+
+    @property
+    def legitimate(self) -> Tensor:
+        """R^d_u: (..., U) bps/Hz."""
+        return self.time_share * spectral_efficiency(self.legitimate_snr)
+
+    @property
+    def eavesdropper(self) -> Tensor:
+        """R^e_u: (..., U) bps/Hz."""
+        return self.time_share * spectral_efficiency(self.eavesdropper_snr)
 
 
 def spectral_efficiency(snr: Tensor) -> Tensor:
     """log2(1 + SNR) in bps/Hz, accurate for small SNR too."""
-    return torch.log1p(snr) / math.log(2.0)
+    return torch.log1p(snr) * (1.0 / math.log(2.0))
 
 
 def relay_rates(
@@ -51,10 +63,7 @@ def relay_rates(
     combined = relay_snr * gains.helper_to_legitimate + ue_snr * gains.ue_to_legitimate
     decoded = ue_snr * gains.ue_to_helper
     overheard = relay_snr * gains.helper_to_eavesdropper + ue_snr * gains.ue_to_eavesdropper
-    return AchievableRates(
-        legitimate=0.5 * spectral_efficiency(torch.minimum(combined, decoded)),
-        eavesdropper=0.5 * spectral_efficiency(overheard),
-    )
+    return AchievableRates(torch.minimum(combined, decoded), overheard, 0.5)
 
 
 def jamming_rates(
@@ -72,14 +81,18 @@ def jamming_rates(
     at_legitimate = ue_snr / (jamming_snr * gains.helper_to_legitimate + 1.0)
     at_eavesdropper = ue_snr / (jamming_snr * gains.helper_to_eavesdropper + 1.0)
     return AchievableRates(
-        legitimate=spectral_efficiency(at_legitimate * gains.ue_to_legitimate),
-        eavesdropper=spectral_efficiency(at_eavesdropper * gains.ue_to_eavesdropper),
+        at_legitimate * gains.ue_to_legitimate, at_eavesdropper * gains.ue_to_eavesdropper, 1.0
     )
 
 
 def secrecy_rate(rates: AchievableRates) -> Tensor:
-    """[R^d_u - R^e_u]^+ of eq. 6: (..., U) bps/Hz."""
-    return (rates.legitimate - rates.eavesdropper).clamp(min=0.0)
+    """[R^d_u - R^e_u]^+ of eq. 6: (..., U) bps/Hz.
+
+    A difference of logarithms is the logarithm of a ratio: one is faster than two, and no digits
+    cancel where both rates are large.
+    """
+    gap = (rates.legitimate_snr - rates.eavesdropper_snr).clamp(min=0.0)
+    return rates.time_share * spectral_efficiency(gap / (1.0 + rates.eavesdropper_snr))
 
 
 def secrecy_sum_rate(secrecy_rate: Tensor, offloading: Tensor) -> Tensor:

@@ -1,23 +1,26 @@
 """A trained actor as a way to fly: Proposed, Re-OT and Ja-OT."""
 
+from collections.abc import Sequence
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.weights import load_weights, select_learner
+from hyuav.learning.weights import join_learners, load_weights, select_learner
 from hyuav.scenario import Scenario
 
 
 class LearnedPolicy(TensorDictModuleBase):
-    """The noise-free actor of one learner, for any batch of helpers.
+    """The noise-free actors of learners, for any batch of helpers.
 
     Args:
         scenario: that the actor was trained on, or another with as many UEs.
         algorithm: with which it was trained.
         weights: of N learners, as a training saves them.
-        learner: which of the N.
+        learner: which of the N; or several, each of which flies one row of the batch's first
+            dimension.
         clock: whether the actor observes the slots flown.
 
     Raises:
@@ -32,18 +35,23 @@ class LearnedPolicy(TensorDictModuleBase):
         scenario: Scenario,
         algorithm: AlgorithmParameters,
         weights: dict[str, Tensor],
-        learner: int = 0,
+        learner: int | Sequence[int] = 0,
         *,
         clock: bool = False,
     ) -> None:
         super().__init__()
-        built = algorithm.build(1, scenario.num_ues + 5 + clock)
-        load_weights(built.loss, select_learner(weights, learner))
+        self._several = not isinstance(learner, int)
+        learners = [learner] if isinstance(learner, int) else learner
+        built = algorithm.build(len(learners), scenario.num_ues + 5 + clock)
+        load_weights(built.loss, join_learners([select_learner(weights, i) for i in learners]))
         self.actor = built.actor
 
     @torch.no_grad()
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Read ``observation`` (..., U + 5), write ``action`` (..., 2) in [-1, 1]."""
-        learner_axis_first = tensordict.select("observation").unsqueeze(0)
-        tensordict["action"] = self.actor(learner_axis_first)["action"].squeeze(0)
+        observed = tensordict.select("observation")
+        if self._several:
+            tensordict["action"] = self.actor(observed)["action"]
+        else:
+            tensordict["action"] = self.actor(observed.unsqueeze(0))["action"].squeeze(0)
         return tensordict

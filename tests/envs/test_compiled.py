@@ -1,0 +1,93 @@
+"""A compiled environment flies as the eager one does."""
+
+import dataclasses
+import shutil
+from typing import Any
+
+import pytest
+import torch
+from tensordict import TensorDictBase
+
+from hyuav import Scenario, make_env
+from hyuav.schemes.linear import ConstantVelocity
+from hyuav.system import SCHEMES
+
+TWO_CLUSTERS = Scenario.preset("two_clusters")
+FULL_EDGE = dataclasses.replace(
+    Scenario.preset("random_disk"), edge_energy_budget=1.0, speed_limit="disc", num_slots=6
+)
+SIXTY = range(60)
+
+COMPILES = pytest.mark.skipif(shutil.which("g++") is None, reason="needs a C++ compiler")
+
+
+def both_flights(scenario: Scenario, **options: Any) -> tuple[TensorDictBase, TensorDictBase]:
+    """Some slots from all over the map, eager and compiled."""
+    generator = torch.Generator().manual_seed(0)
+    envs = [make_env(scenario, compiled=fast, **options) for fast in (False, True)]
+    shape = (*envs[0].batch_size, 2)
+    start = (torch.rand(shape, generator=generator) - 0.5) * scenario.map_side
+    actions = [3 * torch.rand(shape, generator=generator) - 1.5 for _ in range(6)]
+    flights, resets = [], dict[str, TensorDictBase]()
+    for env in envs:
+        state, slots = (
+            env.reset(env.fake_tensordict().select("position").set_("position", start)),
+            [],
+        )
+        for action in actions:
+            flown = env.step(state.set("action", action))
+            slots.append(flown["next"])
+            state = env.step_mdp(flown)
+        # Once compiled, a reset is another way through the same graph.
+        anew = env.reset()
+        assert_equal_up_to_rounding(anew, resets.setdefault("eager", anew))
+        flights.append(torch.stack(slots))
+    assert not envs[1]._eager
+    return flights[0], flights[1]
+
+
+def assert_equal_up_to_rounding(eager: TensorDictBase, fast: TensorDictBase) -> None:
+    assert set(eager.keys(True, True)) == set(fast.keys(True, True))
+    for key in eager.keys(True, True):
+        assert eager[key].dtype == fast[key].dtype, key
+        torch.testing.assert_close(fast[key], eager[key], rtol=2e-5, atol=1e-4, msg=str(key))
+
+
+@COMPILES
+def test_compiled_slots_are_those_of_the_eager_environment() -> None:
+    eager, fast = both_flights(TWO_CLUSTERS, batch_size=300, seed=1, clock=True)
+    assert eager["off_map"].any()
+    assert 0.0 < eager["mode"].double().mean() < 1.0
+    assert_equal_up_to_rounding(eager, fast)
+
+
+@COMPILES
+def test_a_scheme_and_a_seed_for_each_row_a_full_edge_and_a_disc_compile_too() -> None:
+    eager, fast = both_flights(
+        FULL_EDGE,
+        scheme=[SCHEMES[row % 3] for row in SIXTY],
+        batch_size=(60, 4),
+        seed=[row // 2 for row in SIXTY],
+        diagnostics=True,
+    )
+    assert (eager["diagnostics", "edge_load"] > 0).any()
+    assert_equal_up_to_rounding(eager, fast)
+
+
+@COMPILES
+def test_slots_without_fading_compile_too() -> None:
+    calm = dataclasses.replace(TWO_CLUSTERS, fading=False)
+    assert_equal_up_to_rounding(*both_flights(calm, scheme="relay", batch_size=64, seed=0))
+
+
+def test_without_a_compiler_the_environment_is_the_eager_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("CXX", "no-such-compiler")
+    eager, fallen_back = (
+        make_env(TWO_CLUSTERS, batch_size=3, seed=4, compiled=fast).rollout(
+            20, ConstantVelocity(TWO_CLUSTERS, (0.0, 0.0), "jamming")
+        )
+        for fast in (False, True)
+    )
+    torch.testing.assert_close(fallen_back, eager, rtol=0, atol=0)
