@@ -103,7 +103,7 @@ def test_the_exploration_noise_decays_from_the_papers_variance() -> None:
     assert draws[3000:].std() < 0.06
 
 
-@pytest.mark.parametrize("name", ["make_env", "secure_offloading", "random_numbers", "numpy"])
+@pytest.mark.parametrize("name", ["make_env", "compiled_env", "random_numbers", "numpy"])
 def test_the_environments_fly_whole_episodes(name: str) -> None:
     loop = build(name, Work(WORK.scenario, helpers=3))
     assert loop.advance() == WORK.scenario.num_slots

@@ -23,7 +23,7 @@ COLORS = {
     "cleanrl": OKABE_ITO["orange"],
     "torchrl": OKABE_ITO["sky blue"],
     "make_env": OKABE_ITO["bluish green"],
-    "secure_offloading": OKABE_ITO["blue"],
+    "compiled_env": OKABE_ITO["blue"],
     "random_numbers": OKABE_ITO["black"],
     "numpy": OKABE_ITO["vermillion"],
 }

@@ -1,7 +1,5 @@
 """What it takes to fly alone: this project's environments, the NumPy one, and the floor."""
 
-from typing import Any
-
 import numpy as np
 
 from hyuav.benchmark.numpy_environment import NumpyEnv
@@ -65,15 +63,14 @@ class TorchFlights:
 class LearnersEnvironment(TorchFlights):
     """Random flights in the environment as a learner sees it, with its transforms."""
 
-    def __init__(self, work: Work) -> None:
-        super().__init__(work)
-        self.env = self.make(work)
+    compiled = False
 
-    def make(self, work: Work) -> Any:
-        """The environment that is flown."""
+    def __init__(self, work: Work) -> None:
         from hyuav.envs.transforms import make_env
 
-        return make_env(work.scenario, "hybrid", work.helpers, work.device, work.seed)
+        super().__init__(work)
+        where = work.helpers, work.device, work.seed
+        self.env = make_env(work.scenario, "hybrid", *where, compiled=self.compiled)
 
     def fly(self) -> None:
         """One episode of the batch."""
@@ -82,14 +79,10 @@ class LearnersEnvironment(TorchFlights):
             state = self.env.step_mdp(self.env.step(state.set("action", action)))
 
 
-class PhysicalEnvironment(LearnersEnvironment):
-    """Random flights in the environment without its transforms."""
+class CompiledEnvironment(LearnersEnvironment):
+    """The same with its slots compiled."""
 
-    def make(self, work: Work) -> Any:
-        """The environment that is flown."""
-        from hyuav.envs.secure_offloading import SecureOffloadingEnv
-
-        return SecureOffloadingEnv(work.scenario, "hybrid", work.helpers, work.device, work.seed)
+    compiled = True
 
 
 class RandomNumbers(TorchFlights):

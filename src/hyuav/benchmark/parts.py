@@ -13,8 +13,11 @@ from hyuav.scenario import Scenario
 Report = Callable[[str], None]
 """Told what is being measured."""
 
-ENVIRONMENTS = ("make_env", "secure_offloading", "random_numbers")
-"""Measured at every batch size; the NumPy environment flies one helper."""
+ENVIRONMENTS = ("make_env", "compiled_env", "random_numbers")
+"""Measured at every batch size, compiled slots at large ones only; NumPy flies one helper."""
+
+WORTH_COMPILING = 1024
+"""Helpers."""
 
 REFERENCE = "stable_baselines3"
 """The peer that is measured on the whole job and along with growing numbers of UEs and slots."""
@@ -77,7 +80,7 @@ def environment(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator
             report(f"environment: round {number}")
             rows.append(workers["numpy"].measure("environment", seconds, number))
             for helpers in plan.batches:
-                for name, device, count in _combinations(threads):
+                for name, device, count in _combinations(threads, helpers):
                     work = _work(plan, scenario, helpers=helpers, threads=count, device=device)
                     workers[name].start(Entry(name, work))
                     rows.append(workers[name].measure("environment", seconds, number))
@@ -85,11 +88,12 @@ def environment(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator
     yield from ({**row, "peak_mebibytes": peaks[row["entry"]]} for row in rows)
 
 
-def _combinations(threads: list[int]) -> list[tuple[str, str, int]]:
+def _combinations(threads: list[int], helpers: int) -> list[tuple[str, str, int]]:
     """Environment, device, threads."""
     return [
         (name, device, count)
         for name in ENVIRONMENTS
+        if name != "compiled_env" or helpers >= WORTH_COMPILING
         for device in devices()
         for count in (threads if device == "cpu" else [1])
     ]

@@ -17,8 +17,8 @@ LABELS = {
     "sbx": "SBX",
     "cleanrl": "CleanRL-style",
     "torchrl": "TorchRL loop",
-    "make_env": "make_env",
-    "secure_offloading": "SecureOffloadingEnv",
+    "make_env": "Environment",
+    "compiled_env": "Environment, compiled",
     "random_numbers": "Random draws",
     "numpy": "NumPy",
 }
@@ -102,12 +102,15 @@ def _costs(rows: pd.DataFrame) -> Table:
 def _environment(rows: pd.DataFrame, numpy: float) -> Table:
     title = f"Environment: slots/s; the NumPy environment flies one helper at {numpy:,.0f}"
     table = _table(
-        title, "Batch", "make_env", "x NumPy", "of floor", "bare", "x NumPy", "of floor", "draws"
+        title, "Batch", "eager", "x NumPy", "of floor", "compiled", "x NumPy", "of floor", "draws"
     )
     for (device, helpers), group in rows[rows["entry"] != "numpy"].groupby(["device", "helpers"]):
         by_name = group.set_index("entry")
         cells = [f"{helpers:,}" if device == "cpu" else f"{helpers:,} GPU"]
-        for name in ("make_env", "secure_offloading"):
+        for name in ("make_env", "compiled_env"):
+            if name not in by_name.index:
+                cells += ["-"] * 3
+                continue
             rate = float(by_name.loc[name, "median"])  # type: ignore[arg-type]
             share = 100 * float(by_name.loc[name, "share_of_floor"])  # type: ignore[arg-type]
             cells += [_short(rate), f"{rate / numpy:.1f}", f"{share:.0f} %"]

@@ -25,7 +25,7 @@ ENTRIES = {
     "cleanrl": ("cleanrl", "SingleFile"),
     "torchrl": ("torchrl_loop", "TorchRLLoop"),
     "make_env": ("environments", "LearnersEnvironment"),
-    "secure_offloading": ("environments", "PhysicalEnvironment"),
+    "compiled_env": ("environments", "CompiledEnvironment"),
     "numpy": ("environments", "NumpyFlights"),
     "random_numbers": ("environments", "RandomNumbers"),
 }
@@ -37,7 +37,7 @@ LIBRARIES = {"stable_baselines3": ("stable_baselines3",), "sbx": ("sbx", "jax")}
 
 def import_entry(name: str) -> Any:
     """Import the class of an entry and the libraries it stands on."""
-    if name not in ("hyuav", "make_env", "secure_offloading"):
+    if name not in ("hyuav", "make_env", "compiled_env"):
         _leave_out_this_project()
     for library in LIBRARIES.get(name, ()):
         importlib.import_module(library)
