@@ -1,13 +1,24 @@
+from typing import Any
+
 import pytest
 import torch
+from scipy import stats
 
-from hyuav.randomness import BLOCK, RowStream, derived_generator, given_normals
+from hyuav.randomness import (
+    BLOCK,
+    RowStream,
+    derived_seed,
+    given_normals,
+    splitmix64,
+    standard_normal,
+    uniform,
+)
 
 CPU = torch.device("cpu")
 
 
 def stream(*seeds: int, purpose: str = "noise") -> RowStream:
-    return RowStream(lambda n, g: torch.randn(n, 3, generator=g), seeds, purpose, CPU)
+    return RowStream(standard_normal, (3,), seeds, purpose, CPU)
 
 
 def test_a_rows_numbers_do_not_depend_on_the_other_rows() -> None:
@@ -26,8 +37,7 @@ def test_rows_of_equal_seeds_are_equal_and_others_are_not() -> None:
 
 def test_purposes_are_independent() -> None:
     assert not torch.equal(next(stream(4)), next(stream(4, purpose="fading")))
-    one, other = (derived_generator(4, name).initial_seed() for name in ("a", "b"))
-    assert one != other
+    assert len({derived_seed(seed, name) for seed in range(50) for name in ("a", "b")}) == 100
 
 
 @pytest.mark.parametrize("count", [1, BLOCK, 2 * BLOCK + 5])
@@ -44,8 +54,28 @@ def test_a_stream_continues_from_its_state() -> None:
     whole.take(BLOCK + 7)
     other.set_state(whole.state())
     assert torch.equal(whole.take(BLOCK), other.take(BLOCK))
-    with pytest.raises(ValueError, match="zip"):
+    with pytest.raises(RuntimeError):
         stream(1).set_state(whole.state())
+
+
+@pytest.mark.parametrize(
+    ("law", "cumulative"), [(uniform, stats.uniform.cdf), (standard_normal, stats.norm.cdf)]
+)
+def test_numbers_follow_their_law_and_not_each_other(law: Any, cumulative: Any) -> None:
+    numbers = RowStream(law, (5, 2), range(40), "law", CPU).take(100)
+    assert numbers.shape == (100, 40, 5, 2)
+    assert stats.kstest(numbers.flatten().numpy(), cumulative).pvalue > 1e-3
+    columns = numbers.movedim(0, -1).reshape(400, 100).double()
+    correlation = torch.corrcoef(columns).fill_diagonal_(0.0)
+    assert correlation.abs().max() < 6 / 100**0.5
+    assert correlation.square().mean() == pytest.approx(1 / 100, rel=0.1)
+    assert law(splitmix64(torch.arange(10**6))).isfinite().all()
+
+
+def test_uniform_numbers_stay_below_one() -> None:
+    extremes = uniform(torch.tensor([0, -1, 2**63 - 1, -(2**63)]))
+    assert extremes.min() == 0.0
+    assert extremes.max() < 1.0
 
 
 def test_normal_draws_of_pytorch_take_the_given_numbers() -> None:

@@ -1,5 +1,6 @@
 """Random numbers that belong to one row of a batch, whatever other rows there are."""
 
+import math
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,24 +11,63 @@ import torch
 from torch import Tensor
 from torch.overrides import TorchFunctionMode
 
+GAMMA, MIX_1, MIX_2 = -0x61C8864680B583EB, -0x40A7B892E31B1A47, -0x6B2FB644ECCEEE15
+"""The constants of SplitMix64, as signed numbers."""
+
 BLOCK = 64
-"""Draws made at once for each row."""
+"""Draws made at once where they are asked for one by one."""
 
 
-def derived_generator(seed: int, purpose: str) -> torch.Generator:
-    """A generator for one purpose; those of other seeds or purposes are independent of it."""
+def splitmix64(state: Tensor) -> Tensor:
+    """The 64 random bits of each state (...) int64; the states of a sequence are GAMMA apart.
+
+    Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014. Any
+    number of a sequence can be had without those before it, in a few operations that a compiler
+    fuses with what the number is used for.
+    """
+    state = (state ^ _shifted(state, 30)) * MIX_1
+    state = (state ^ _shifted(state, 27)) * MIX_2
+    return state ^ _shifted(state, 31)
+
+
+def _shifted(bits: Tensor, count: int) -> Tensor:
+    return (bits >> count) & ((1 << (64 - count)) - 1)
+
+
+def uniform(bits: Tensor) -> Tensor:
+    """Numbers in [0, 1) from 64 random bits each: (...) float32."""
+    return (bits >> 40 & 0xFFFFFF).float() * 2.0**-24
+
+
+def polar(bits: Tensor, dtype: torch.dtype = torch.float32) -> tuple[Tensor, Tensor]:
+    """A level in (0, 1] and an angle in rad, uniform both, from 64 random bits each: (...)."""
+    # 31 bits decide the level, so that the smallest is well below float32's 2^-24.
+    level = ((bits >> 32 & 0x7FFFFFFF).to(dtype) + 0.5) * 2.0**-31
+    angle = (bits & 0xFFFFFFFF).to(dtype) * (2.0 * math.pi * 2.0**-32)
+    return level, angle
+
+
+def standard_normal(bits: Tensor) -> Tensor:
+    """Normal numbers from 64 random bits each (Box and Muller, 1958): (...) float32."""
+    level, angle = polar(bits)
+    return (-2.0 * level.log()).sqrt() * angle.cos()
+
+
+def derived_seed(seed: int, purpose: str) -> int:
+    """A seed for one purpose; those of other seeds or purposes are independent of it."""
     entropy = np.random.SeedSequence([seed, zlib.crc32(purpose.encode())])
-    return torch.Generator().manual_seed(int(entropy.generate_state(1, np.uint64)[0] >> 1))
+    return int(entropy.generate_state(1, np.uint64)[0] >> 1)
 
 
 class RowStream:
     """Random tensors, one after another, in which each row is drawn from its own seed.
 
-    Rows of equal seeds are equal. Numbers are drawn on the CPU in blocks, so that they are the
-    same on every device and cost no loop over the rows in most calls.
+    Each number depends on its row's seed and its place alone: which draw, and where in it. So it
+    does not matter what other rows there are or how many draws are made at once.
 
     Args:
-        draw: makes ``count`` draws (count, *shape) with a generator.
+        law: of random bits, such as :func:`uniform` and :func:`standard_normal`.
+        shape: of each row's draw.
         seeds: of the rows.
         purpose: what the numbers are for; streams of other purposes are independent.
         device: of the tensors.
@@ -35,64 +75,54 @@ class RowStream:
 
     def __init__(
         self,
-        draw: Callable[[int, torch.Generator], Tensor],
+        law: Callable[[Tensor], Tensor],
+        shape: tuple[int, ...],
         seeds: Sequence[int],
         purpose: str,
         device: torch.device,
     ) -> None:
-        self._draw, self._device = draw, device
-        distinct = list(dict.fromkeys(seeds))
-        self._generators = [derived_generator(seed, purpose) for seed in distinct]
-        self._rows: list[int] | None = None
-        if len(distinct) < len(seeds):
-            self._rows = [distinct.index(seed) for seed in seeds]
-        self._refill()
-
-    def _refill(self) -> None:
-        self._before = [generator.get_state() for generator in self._generators]
-        draws = [self._draw(BLOCK, generator) for generator in self._generators]
-        self._block = torch.stack(draws, dim=1).to(self._device)
-        self._used = 0
+        self._law, self._width = law, math.prod(shape)
+        trailing = (1,) * len(shape)
+        keys = [derived_seed(seed, purpose) for seed in seeds]
+        self._keys = torch.tensor(keys, device=device).reshape(-1, *trailing)
+        self._places = torch.arange(1, self._width + 1, device=device).reshape(shape) * GAMMA
+        self._drawn = 0
+        self._block: tuple[int, Tensor] | None = None
 
     def __iter__(self) -> Self:
         return self
 
     def __next__(self) -> Tensor:
         """The next draw: (rows, *shape)."""
-        return self.take(1)[0]
+        if self._block is None or not 0 <= self._drawn - self._block[0] < BLOCK:
+            self._block = self._drawn, self._numbers(BLOCK)
+        first, numbers = self._block
+        self._drawn += 1
+        return numbers[self._drawn - 1 - first]
 
     def take(self, count: int) -> Tensor:
         """The next ``count`` draws: (count, rows, *shape)."""
-        parts = []
-        while count:
-            if self._used == BLOCK:
-                self._refill()
-            part = self._block[self._used : self._used + count]
-            self._used += len(part)
-            count -= len(part)
-            parts.append(part)
-        draws = parts[0] if len(parts) == 1 else torch.cat(parts)
-        if self._rows is None:
-            return draws
-        if len(self._generators) == 1:
-            return draws.expand(-1, len(self._rows), *draws.shape[2:])
-        return draws[:, self._rows]
+        numbers = self._numbers(count)
+        self._drawn += count
+        return numbers
+
+    def _numbers(self, count: int) -> Tensor:
+        draws = torch.arange(self._drawn, self._drawn + count, device=self._keys.device)
+        draws = draws.reshape(-1, *(1,) * self._keys.ndim) * self._width * GAMMA
+        return self._law(splitmix64(draws + self._keys + self._places))
 
     def state(self) -> dict[str, Any]:
         """Where the stream stands, for :meth:`set_state`."""
-        return {"generators": torch.stack(self._before), "used": self._used}
+        return {"keys": self._keys, "drawn": self._drawn}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Continue where :meth:`state` was taken from a stream with as many seeds.
+        """Continue where :meth:`state` was taken from a stream with as many rows.
 
         Raises:
-            ValueError: it had another number of seeds.
+            RuntimeError: it had another number of rows.
         """
-        pairs = zip(self._generators, state["generators"], strict=True)
-        for generator, before in pairs:
-            generator.set_state(before.clone())  # a view is not read from its offset
-        self._refill()
-        self._used = int(state["used"])
+        self._keys = state["keys"].to(self._keys.device).reshape(self._keys.shape)
+        self._drawn, self._block = int(state["drawn"]), None
 
 
 class _GivenNormals(TorchFunctionMode):

@@ -8,8 +8,9 @@ import torch
 from scipy import stats
 
 from hyuav import InputError, Scenario
-from hyuav.envs.draws import GAMMA, BatchDraws, splitmix64
+from hyuav.envs.draws import BatchDraws
 from hyuav.envs.transforms import make_env
+from hyuav.randomness import GAMMA, splitmix64
 from hyuav.system import SecureOffloadingSystem
 from reference import assert_same
 

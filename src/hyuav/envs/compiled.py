@@ -1,7 +1,5 @@
 """The slots of an environment as one compiled graph, for batches of thousands of helpers."""
 
-import os
-import shutil
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -9,12 +7,11 @@ from typing import Any
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
-from torch._dynamo.exc import BackendCompilerFailed
-from torch._inductor.exc import InductorError
 from torch.fx import Graph, Node
 from torch.fx.experimental.proxy_tensor import make_fx
 from torchrl.envs import TransformedEnv
 
+from hyuav.recording import COMPILATION_ERRORS, compile_graph, has_compiler
 from hyuav.system import Tasks
 
 Flight = Callable[..., tuple[Tensor, ...]]
@@ -99,7 +96,7 @@ class CompiledEnv(TransformedEnv):
         arguments = [*self._inputs(tensordict), *draws.ticket(tasks=False)]
         draws.set_state(state)
         self._eager = True
-        if self.device.type == "cpu" and shutil.which(os.environ.get("CXX", "g++")) is None:
+        if not has_compiler(self.device):
             return
         try:
             with torch.no_grad(), warnings.catch_warnings():
@@ -107,9 +104,9 @@ class CompiledEnv(TransformedEnv):
                 recorded = make_fx(self._fly)(*arguments)
                 _keep_the_batch_last(recorded.graph)
                 recorded.recompile()
-                flight: Any = torch._inductor.compile(recorded, [*arguments], options=OPTIONS)
+                flight = compile_graph(recorded, arguments, OPTIONS)
                 flight(*arguments)
-        except (BackendCompilerFailed, InductorError) as error:
+        except COMPILATION_ERRORS as error:
             warnings.warn(f"slots are not compiled: {error}", stacklevel=2)
             return
         self._flight, self._eager = flight, False

@@ -1,6 +1,5 @@
 """What is random in the environment: one draw of fading and tasks for each slot."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -8,32 +7,13 @@ import torch
 from torch import Tensor
 
 from hyuav.model.channel import RicianFading
-from hyuav.randomness import derived_generator
+from hyuav.randomness import GAMMA, derived_seed, polar, splitmix64, uniform
 from hyuav.system import SecureOffloadingSystem, Tasks
-
-GAMMA, MIX_1, MIX_2 = -0x61C8864680B583EB, -0x40A7B892E31B1A47, -0x6B2FB644ECCEEE15
-"""The constants of SplitMix64, as signed numbers."""
 
 NUMBERS_AT_ONCE = 2**14
 """Drawn for as many slots as this suffices for, but at least one."""
 
 NAMES = ("fading", "tasks")
-
-
-def splitmix64(state: Tensor) -> Tensor:
-    """The 64 random bits of each state (...) int64; the states of a sequence are GAMMA apart.
-
-    Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014. Any
-    number of a sequence can be had without those before it, in a few operations that a compiler
-    fuses with what the number is used for.
-    """
-    state = (state ^ _shifted(state, 30)) * MIX_1
-    state = (state ^ _shifted(state, 27)) * MIX_2
-    return state ^ _shifted(state, 31)
-
-
-def _shifted(bits: Tensor, count: int) -> Tensor:
-    return (bits >> count) & ((1 << (64 - count)) - 1)
 
 
 class Draws:
@@ -52,7 +32,7 @@ class Draws:
         self, system: SecureOffloadingSystem, seeds: Sequence[int], inner: torch.Size
     ) -> None:
         self._system, self._rank = system, 1 + len(inner)
-        keys = [[derived_generator(seed, name).initial_seed() for seed in seeds] for name in NAMES]
+        keys = [[derived_seed(seed, name) for seed in seeds] for name in NAMES]
         self._keys = self._tensor(keys).reshape(len(NAMES), len(seeds), *(1 for _ in inner))
         num_ues, device = system.scenario.num_ues, system.device
         per_slot = len(seeds) * inner.numel() * (3 * num_ues + 2)
@@ -140,17 +120,11 @@ class Draws:
         """
         column, helper, per_slot = self._places[name]
         bits = splitmix64(helper + (keys + slots * per_slot * GAMMA) + column)
-        numbers = self._powers(bits) if name == "fading" else self._levels(bits)
+        if name == "fading":
+            numbers = self._law.power(*polar(bits, self._system.dtype))
+        else:
+            numbers = uniform(bits).to(self._system.dtype)
         return numbers.movedim(-1 - self._rank, -1)
-
-    def _powers(self, bits: Tensor) -> Tensor:
-        # 31 bits decide the level, so that the smallest is well below float32's 2^-24.
-        level = ((bits >> 32 & 0x7FFFFFFF).to(self._system.dtype) + 0.5) * 2.0**-31
-        angle = (bits & 0xFFFFFFFF).to(self._system.dtype) * (2.0 * math.pi * 2.0**-32)
-        return self._law.power(level, angle)
-
-    def _levels(self, bits: Tensor) -> Tensor:
-        return (bits >> 40 & 0xFFFFFF).to(self._system.dtype) * 2.0**-24
 
     def _as_tasks(self, levels: Tensor) -> Tasks:
         return self._system.tasks_of(*levels.chunk(2, dim=-1))

@@ -1,5 +1,6 @@
 """Learners of one horizon side by side: Algorithm 1, one episode at a time."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,7 @@ from hyuav.learning.replay import as_transition, make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import copy_weights, draw_weights, replace_learners
 from hyuav.parameters import Parameters, choice, count, optional, parameter
-from hyuav.randomness import RowStream, given_normals
+from hyuav.randomness import RowStream, given_normals, standard_normal, uniform
 from hyuav.scenario import Scenario
 from hyuav.system import SCHEMES
 
@@ -88,22 +89,17 @@ class Cohort:
         self.best_weights = copy_weights(self.algorithm.loss)
 
     def _random_streams(self, seeds: Sequence[int]) -> dict[str, RowStream]:
-        size, device = self.batch_size, self.env.device
-        normals = sum(step.normals for step in self.algorithm.steps)
-
-        def exploration(count: int, generator: torch.Generator) -> Tensor:
-            return torch.randn(count, 2, generator=generator)
-
-        def losses(count: int, generator: torch.Generator) -> Tensor:
-            return torch.randn(count, normals, size, 2, generator=generator)
-
-        def sampling(count: int, generator: torch.Generator) -> Tensor:
-            return torch.rand(count, size, generator=generator)
-
-        laws = {"exploration": exploration, "sampling": sampling}
-        if normals:
-            laws["losses"] = losses
-        return {name: RowStream(draw, seeds, name, device) for name, draw in laws.items()}
+        size, normals = self.batch_size, sum(step.normals for step in self.algorithm.steps)
+        laws = {
+            "exploration": (standard_normal, (2,)),
+            "sampling": (uniform, (size,)),
+            "losses": (standard_normal, (normals, size, 2)),
+        }
+        return {
+            name: RowStream(law, shape, seeds, name, self.env.device)
+            for name, (law, shape) in laws.items()
+            if math.prod(shape)
+        }
 
     def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
         with given_normals(self._streams["exploration"]):
@@ -118,7 +114,7 @@ class Cohort:
         """Fly from the next episode on by compiled programs; see :class:`CompiledSlots`.
 
         Raises:
-            One of :data:`hyuav.learning.recording.COMPILATION_ERRORS`.
+            One of :data:`hyuav.recording.COMPILATION_ERRORS`.
         """
         if self._compiled is None:
             self._compiled = CompiledSlots(

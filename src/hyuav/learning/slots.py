@@ -18,9 +18,9 @@ from torchrl.data import ReplayBuffer
 from torchrl.envs import TransformedEnv
 
 from hyuav.learning.algorithms import Algorithm, GradientStep
-from hyuav.learning.recording import compile_function
 from hyuav.learning.replay import TRANSITION, as_transition, sampled_slots
 from hyuav.randomness import given_normals
+from hyuav.recording import compile_function
 from hyuav.system import Tasks
 
 
@@ -49,7 +49,7 @@ class CompiledSlots:
         carrier: what the helpers observe, (N,); an example.
 
     Raises:
-        One of :data:`hyuav.learning.recording.COMPILATION_ERRORS`.
+        One of :data:`hyuav.recording.COMPILATION_ERRORS`.
     """
 
     def __init__(

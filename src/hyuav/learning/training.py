@@ -3,7 +3,6 @@
 import dataclasses
 import math
 import os
-import shutil
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,9 +16,9 @@ from torch import Tensor
 from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.cohort import Cohort, Learner
-from hyuav.learning.recording import COMPILATION_ERRORS
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
 from hyuav.parameters import Parameters, choice, count, parameter, switch
+from hyuav.recording import COMPILATION_ERRORS, has_compiler
 from hyuav.scenario import Scenario
 
 COMPILE_SECONDS = 20.0
@@ -184,7 +183,7 @@ class Training:
     def _compiling_pays(self) -> bool:
         if self.parameters.compile != "auto":
             return self.parameters.compile == "always"
-        if shutil.which(os.environ.get("CXX", "g++")) is None:
+        if not has_compiler(self.cohorts[0].env.device):
             return False
         episodes = self.parameters.num_episodes - self.episode
         per_slot, per_learner = SECONDS_SAVED

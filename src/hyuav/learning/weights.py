@@ -11,7 +11,7 @@ from torch import Tensor
 from torchrl.objectives import LossModule
 
 from hyuav.errors import InputError
-from hyuav.randomness import derived_generator
+from hyuav.randomness import derived_seed
 
 
 def _learner_axis(weights: Tensor) -> int:
@@ -27,7 +27,7 @@ def draw_weights(loss: LossModule, seeds: Sequence[int]) -> None:
         loss: holding the networks of N learners.
         seeds: of the N learners.
     """
-    generators = [derived_generator(seed, "weights") for seed in seeds]
+    generators = [torch.Generator().manual_seed(derived_seed(seed, "weights")) for seed in seeds]
     networks = dict(loss.named_parameters())
     for name, values in networks.items():
         layer, _, kind = name.rpartition(".")

@@ -2,7 +2,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from hyuav.learning.recording import compile_function, record
+from hyuav.recording import compile_function, record
 
 
 def test_what_a_function_does_is_recorded_and_not_done() -> None:

@@ -6,6 +6,8 @@ memory, and what it does becomes a list of tensor operations. Nothing of the Pyt
 them is left, nor any check of it before each call, which is what costs in small networks.
 """
 
+import os
+import shutil
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -13,12 +15,20 @@ import torch
 from tensordict.nn import CudaGraphModule
 from torch import Tensor
 from torch._dynamo.exc import BackendCompilerFailed
+from torch._guards import TracingContext, tracing
 from torch._inductor.exc import InductorError
+from torch._subclasses.fake_tensor import FakeTensorMode
 from torch.fx import GraphModule
 from torch.fx.experimental.proxy_tensor import make_fx
+from torch.fx.experimental.symbolic_shapes import ShapeEnv
 
 COMPILATION_ERRORS = (BackendCompilerFailed, InductorError)
 """What :func:`compile_function` raises where there is no working compiler."""
+
+
+def has_compiler(device: torch.device) -> bool:
+    """Whether there is a compiler for the device, working or not."""
+    return device.type != "cpu" or shutil.which(os.environ.get("CXX", "g++")) is not None
 
 
 def record(
@@ -90,7 +100,7 @@ def compile_function(
 def _compile(
     graph: GraphModule, arguments: Sequence[Tensor], on_cpu: bool, *, trust_compiler: bool
 ) -> Callable[..., Any]:
-    """Let Inductor compile, with options that are measured in docs/performance.md.
+    """Let Inductor compile, with options that docs/performance.md explains.
 
     A compiler that is trusted to know this processor's instructions need not prove it, which
     takes a third of the time.
@@ -101,5 +111,24 @@ def _compile(
         "cpp.vec_isa_ok": True if trust_compiler else None,
         "pattern_matcher": False,
     }
-    with torch.no_grad():
-        return torch._inductor.compile(graph, list(arguments), options=options)
+    return compile_graph(graph, arguments, options)
+
+
+def compile_graph(
+    graph: GraphModule, arguments: Sequence[Tensor], options: dict[str, Any]
+) -> Callable[..., Any]:
+    """Let Inductor compile a graph of tensor operations, or find it compiled on the disk.
+
+    Args:
+        graph: to compile.
+        arguments: examples of what it takes.
+        options: of Inductor.
+
+    Raises:
+        One of :data:`COMPILATION_ERRORS`.
+    """
+    fake = FakeTensorMode(shape_env=ShapeEnv())  # which Inductor's cache on the disk needs
+    examples: Any = [fake.from_tensor(each, static_shapes=True) for each in arguments]
+    options = {"cpp_cache_precompile_headers": False, **options}  # they cost more than they save
+    with torch.no_grad(), tracing(TracingContext(fake)):
+        return torch._inductor.compile(graph, examples, options=options)
