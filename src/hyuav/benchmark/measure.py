@@ -53,12 +53,13 @@ class Worker:
 
     Args:
         entry: that lives in it.
+        cache: directory in which it finds what was compiled before; None for an empty one.
 
     Raises:
         InputError: the entry's libraries cannot be imported.
     """
 
-    def __init__(self, entry: Entry) -> None:
+    def __init__(self, entry: Entry, cache: str | None = None) -> None:
         self.entry = entry
         self.facts: Row = {}
         self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed with the process
@@ -71,7 +72,7 @@ class Worker:
             stderr=self._errors,
             env=os.environ
             | _environment(entry.work.threads)
-            | {"TORCHINDUCTOR_CACHE_DIR": self._cache.name},
+            | {"TORCHINDUCTOR_CACHE_DIR": cache or self._cache.name},
             text=True,
         )
         self._answer()
@@ -190,10 +191,10 @@ def alternate(part: str, workers: Sequence[Worker], rounds: int, seconds: float)
     return [row | worker.facts for worker, row in measured]
 
 
-def job_seconds(part: str, entry: Entry, number: int) -> Row:
-    """A whole training from the start of its process to its end."""
+def job_seconds(part: str, entry: Entry, number: int, cache: str | None = None) -> Row:
+    """A whole training from the start of its process to its end; see :class:`Worker`."""
     begun = time.perf_counter()
-    with Worker(entry) as process:
+    with Worker(entry, cache) as process:
         done = process.ask(do="job", work=entry.work.to_dict())
     seconds = time.perf_counter() - begun
     steps = done["slots"] * entry.work.learners

@@ -13,6 +13,7 @@ from hyuav.benchmark.work import Work
 
 LABELS = {
     "hyuav": "HyUAV",
+    "hyuav_again": "HyUAV, run again",
     "stable_baselines3": "Stable-Baselines3",
     "sbx": "SBX",
     "cleanrl": "CleanRL-style",

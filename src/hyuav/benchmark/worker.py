@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 ENTRIES = {
     "hyuav": ("own", "OwnTraining"),
+    "hyuav_again": ("own", "OwnTraining"),
     "stable_baselines3": ("stable_baselines", "StableBaselines3"),
     "sbx": ("stable_baselines", "SBX"),
     "cleanrl": ("cleanrl", "SingleFile"),
@@ -37,7 +38,7 @@ LIBRARIES = {"stable_baselines3": ("stable_baselines3",), "sbx": ("sbx", "jax")}
 
 def import_entry(name: str) -> Any:
     """Import the class of an entry and the libraries it stands on."""
-    if name not in ("hyuav", "make_env", "compiled_env"):
+    if name not in ("hyuav", "hyuav_again", "make_env", "compiled_env"):
         _leave_out_this_project()
     for library in LIBRARIES.get(name, ()):
         importlib.import_module(library)
