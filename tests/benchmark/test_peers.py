@@ -1,5 +1,6 @@
 """Every library does the same work: one update after every slot, once a mini-batch is stored."""
 
+import dataclasses
 import importlib
 from typing import Any
 
@@ -108,3 +109,10 @@ def test_the_environments_fly_whole_episodes(name: str) -> None:
     loop = build(name, Work(WORK.scenario, helpers=3))
     assert loop.advance() == WORK.scenario.num_slots
     assert loop.width == (1 if name == "numpy" else 3)
+
+
+def test_five_schemes_are_evaluated_and_three_optima_solved() -> None:
+    small = dataclasses.replace(WORK.scenario, num_slots=10, fading=False)
+    work = dataclasses.replace(WORK, scenario=small, episodes=4)
+    assert build("five_schemes", work).advance() == 5 * 4 * 10
+    assert build("optima", work).advance() == 3 * 10

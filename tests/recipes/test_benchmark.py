@@ -135,7 +135,10 @@ def test_an_entry_that_fails_says_why() -> None:
 
 
 REFUSALS = [
-    (["parts=speed"], "parts = 'speed': expected one of training, environment, job, scaling"),
+    (
+        ["parts=speed"],
+        "parts = 'speed': expected one of training, environment, job",
+    ),
     (["peers=[sb4]"], "peers[0] = 'sb4': expected one of stable_baselines3, sbx"),
     (["seconds=0"], "seconds = 0: expected a finite number > 0"),
     (["learners=[1,0]"], "learners[1] = 0: expected a whole number >= 1"),

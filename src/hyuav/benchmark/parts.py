@@ -69,6 +69,17 @@ def job(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator[Row]:
                 yield job_seconds("job", Entry(name, work), number, kept)
 
 
+def references(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator[Row]:
+    """Evaluating five schemes for as many episodes as the job has, and solving for the optima."""
+    work = _work(plan, scenario, episodes=plan.episodes)
+    for name in ("five_schemes", "optima"):
+        with Worker(Entry(name, work)) as worker:
+            worker.start()
+            for number in range(1, plan.rounds + 1):
+                report(f"references: {name}, round {number}")
+                yield worker.measure("references", 1e-9, number)  # once
+
+
 def environment(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator[Row]:
     """Slots/s of the environments by batch size, of the NumPy one, and of the draws alone.
 
@@ -163,5 +174,11 @@ def _side_by_side(
         return alternate(part, workers, plan.rounds, plan.seconds)
 
 
-MEASURE = {"training": training, "environment": environment, "job": job, "scaling": scaling}
+MEASURE = {
+    "training": training,
+    "environment": environment,
+    "job": job,
+    "references": references,
+    "scaling": scaling,
+}
 """By the name of the part."""

@@ -12,7 +12,7 @@ from hyuav.benchmark.worker import LIBRARIES
 from hyuav.errors import InputError
 from hyuav.parameters import Parameters, choice, count, number, one_or_more, parameter, switch
 
-PARTS = ("training", "environment", "job", "scaling")
+PARTS = ("training", "environment", "job", "references", "scaling")
 PEERS = ("stable_baselines3", "sbx", "cleanrl", "torchrl")
 
 _counts = one_or_more(count(), "whole numbers >= 1")

@@ -22,6 +22,8 @@ LABELS = {
     "compiled_env": "Environment, compiled",
     "random_numbers": "Random draws",
     "numpy": "NumPy",
+    "five_schemes": "Evaluating five schemes",
+    "optima": "Optima of three mode rules",
 }
 """How entries are called in tables and figures."""
 
@@ -51,6 +53,8 @@ def print_tables(results: Results, console: Console) -> None:
                 console.print(_environment(rows, float(numpy.iloc[0])))
             case "job":
                 console.print(_job(rows))
+            case "references":
+                console.print(_references(rows, summary[summary["part"] == "job"]))
             case _:
                 console.print(_scaling(rows, str(part)))
 
@@ -131,6 +135,15 @@ def _job(rows: pd.DataFrame) -> Table:
             _number(row["ratio_to_stable_baselines3"], ".2f"),
             f"{row['peak_mebibytes']:.0f}",
         )
+    return table
+
+
+def _references(rows: pd.DataFrame, jobs: pd.DataFrame) -> Table:
+    table = _table("Beside a training", "Work", "seconds", "of the whole job")
+    job = jobs[jobs["entry"] == "hyuav"]["seconds"]
+    for _, row in rows.iterrows():
+        share = 100 * row["seconds"] / float(job.iloc[0]) if len(job) else None
+        table.add_row(label(row), f"{row['seconds']:.2f}", _number(share, ".0f", " %"))
     return table
 
 

@@ -29,8 +29,13 @@ ENTRIES = {
     "compiled_env": ("environments", "CompiledEnvironment"),
     "numpy": ("environments", "NumpyFlights"),
     "random_numbers": ("environments", "RandomNumbers"),
+    "five_schemes": ("references", "FiveSchemes"),
+    "optima": ("references", "Optima"),
 }
 """Where each entry is found: module of this package, and class."""
+
+PEERS = ("stable_baselines3", "sbx", "cleanrl", "torchrl", "numpy", "random_numbers")
+"""Entries that need nothing of this project but the scenario."""
 
 LIBRARIES = {"stable_baselines3": ("stable_baselines3",), "sbx": ("sbx", "jax")}
 """What an entry imports beyond what this project itself needs."""
@@ -38,7 +43,7 @@ LIBRARIES = {"stable_baselines3": ("stable_baselines3",), "sbx": ("sbx", "jax")}
 
 def import_entry(name: str) -> Any:
     """Import the class of an entry and the libraries it stands on."""
-    if name not in ("hyuav", "hyuav_again", "make_env", "compiled_env"):
+    if name in PEERS:
         _leave_out_this_project()
     for library in LIBRARIES.get(name, ()):
         importlib.import_module(library)
