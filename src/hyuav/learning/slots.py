@@ -93,10 +93,10 @@ class CompiledSlots:
 
         Args:
             carrier: what the helpers observe before the first slot, (N,); left as it is.
-            draws: random numbers, a slot in each row: ``exploration`` (slots, N, 2) and
-                ``losses`` (slots, n, N, K, 2) standard normal, ``sampling`` (slots, N, K)
-                uniform, ``fading`` (slots, N, 3 U + 2) and ``tasks`` (slots, N, 2, U) where the
-                environment needs them.
+            draws: random numbers, a slot in each row: ``exploration`` (slots, N, 2), standard
+                normal; ``sampling`` (slots, N, K), uniform; ``losses`` (slots, N, n, K, 2),
+                standard normal, where the losses draw n times; ``fading`` (slots, N, 3 U + 2) and
+                ``tasks`` (slots, N, 2, U) where the environment needs them.
             updates: taken before.
 
         Returns:
