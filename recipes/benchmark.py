@@ -14,10 +14,11 @@ from hyuav.benchmark.arithmetic import matrix_rate
 from hyuav.benchmark.charts import draw
 from hyuav.benchmark.machine import facts
 from hyuav.benchmark.parts import MEASURE
-from hyuav.benchmark.plan import Benchmark, cores, devices, require_peers
+from hyuav.benchmark.plan import Benchmark, devices, require_peers
 from hyuav.benchmark.results import Results
 from hyuav.benchmark.tables import print_tables
 from hyuav.configuration import Config, recipe, section
+from hyuav.recording import cores
 from hyuav.runs import named_scenario, require_writable
 
 

@@ -49,7 +49,7 @@ def main(config: Config, _: Path) -> None:
     torch.set_num_threads(options.threads)
     runs = [RunDirectory(path) for path in options.run]
     first = runs[0].configuration()
-    if len(set(options.run)) < len(runs):
+    if len({Path(path).resolve() for path in options.run}) < len(runs):
         raise InputError(rejection("run", list(options.run), "different run directories"))
     for run in runs[1:]:
         if run.configuration().scenario != first.scenario:

@@ -85,6 +85,8 @@ def test_normal_draws_of_pytorch_take_the_given_numbers() -> None:
         reparametrized = torch.distributions.Normal(torch.full((2, 3), 5.0), 2.0).rsample()
         sampled = torch.distributions.Normal(torch.full((2, 3), 5.0), 2.0).sample()
         filled = torch.empty(2, 3).normal_()
+        with pytest.raises(RuntimeError, match="rand would draw from the global generator"):
+            torch.rand(3)
     for drawn, expected in (
         (like, given[0]),
         (reparametrized, 5 + 2 * given[1]),

@@ -95,10 +95,10 @@ def test_progress_is_quiet_when_piped_and_shows_the_return_on_a_terminal(tmp_pat
 def test_learners_are_named_by_what_tells_them_apart() -> None:
     schemes = [Learner("hybrid"), Learner("relay")]
     seeds = [Learner("hybrid", 3), Learner("hybrid", 4)]
-    horizons = [Learner("relay", 3, 10), Learner("relay", 4, 20)]
-    assert learner_names(schemes) == ["hybrid", "relay"]
-    assert learner_names(seeds) == ["hybrid_seed3", "hybrid_seed4"]
-    assert learner_names(horizons) == ["relay_T10_seed3", "relay_T20_seed4"]
+    horizons = [Learner("relay", 3, 10), Learner("relay", 4)]
+    assert learner_names(schemes, [20, 20]) == ["hybrid", "relay"]
+    assert learner_names(seeds, [20, 20]) == ["hybrid_seed3", "hybrid_seed4"]
+    assert learner_names(horizons, [10, 20]) == ["relay_T10_seed3", "relay_T20_seed4"]
 
 
 def test_an_unknown_logger_mode_is_refused() -> None:

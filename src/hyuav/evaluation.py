@@ -17,6 +17,7 @@ from torch import Tensor
 from hyuav.envs.transforms import make_env
 from hyuav.errors import InputError, rejection, require_choice
 from hyuav.parameters import Parameters, count, number, parameter
+from hyuav.randomness import derived_seed
 from hyuav.scenario import Scenario
 from hyuav.schemes.optimum import RESOLUTION
 
@@ -162,7 +163,8 @@ def fly(
     device: torch.device | str | None = None,
 ) -> Flights:
     """Fly all learners of a policy through the same episodes, with diagnostics."""
-    batch_size, seeds = (policy.learners, parameters.episodes), [parameters.seed] * policy.learners
+    batch_size = policy.learners, parameters.episodes
+    seeds = [derived_seed(parameters.seed, "evaluation")] * policy.learners
     env = make_env(
         scenario, MODE_RULES[scheme], batch_size, device, seeds, True, clock=policy.clock
     )

@@ -12,13 +12,13 @@ from rich.console import Console
 from rich.table import Table
 from torch import Tensor
 
-from hyuav.errors import InputError
+from hyuav.errors import InputError, rejection
 from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
 from hyuav.figures import flight_map, learning_curves, save_figure, sum_rate_maps
 from hyuav.learning.checkpoint import load_weights_file
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training
-from hyuav.learning.weights import join_learners, select_learner
+from hyuav.learning.weights import count_learners, join_learners, select_learner
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
@@ -144,18 +144,25 @@ def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[s
             UEs than the scenario has, or none was trained for the horizon.
     """
     policies: dict[str, list[Policy]] = {}
+    horizons: set[int] = set()
     for run in runs:
         configuration, weights = run.configuration(), run.best_weights()
+        if count_learners(weights) != len(configuration.learners):
+            accepted = f"weights of {len(configuration.learners)} learners"
+            raise InputError(rejection("checkpoint", str(run.best_checkpoint), accepted))
         clock = configuration.training.clock
         by_scheme: dict[str, list[int]] = {}
         for index, learner in enumerate(configuration.learners):
-            if (learner.num_slots or configuration.scenario.num_slots) == scenario.num_slots:
+            horizon = learner.num_slots or configuration.scenario.num_slots
+            horizons.add(horizon)
+            if horizon == scenario.num_slots:
                 by_scheme.setdefault(LEARNED[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
             module = LearnedPolicy(scenario, configuration.algorithm, weights, indices, clock=clock)
             policies.setdefault(scheme, []).append(Policy(module, len(indices), clock))
     if not policies:
-        raise InputError(f"num_slots = {scenario.num_slots}: no learner was trained for it")
+        accepted = f"what learners were trained for, {', '.join(map(str, sorted(horizons)))}"
+        raise InputError(rejection("num_slots", scenario.num_slots, accepted))
     return policies
 
 

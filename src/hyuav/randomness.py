@@ -125,20 +125,36 @@ class RowStream:
         self._drawn, self._block = int(state["drawn"]), None
 
 
+_OTHER_DRAWS = (
+    *(torch.randn, torch.rand, torch.rand_like, torch.randint, torch.randperm, torch.bernoulli),
+    *(torch.multinomial, torch.Tensor.uniform_, torch.Tensor.exponential_),
+    *(torch.Tensor.bernoulli_, torch.Tensor.random_, torch.Tensor.cauchy_),
+)
+"""What nothing inside :func:`given_normals` may call."""
+
+
 class _GivenNormals(TorchFunctionMode):
     def __init__(self, source: Iterator[Tensor]) -> None:
         super().__init__()
         self._source = source
 
     def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        kwargs = kwargs or {}
         if func is torch.randn_like:
             return next(self._source)
-        if func is torch.Tensor.normal_ and len(args) == 1 and not kwargs:
-            return args[0].copy_(next(self._source))
+        if func is torch.Tensor.normal_:
+            return self._fill(*args, **kwargs)
         if func is torch.normal:
-            mean, std = args
-            return mean + std * next(self._source)
-        return func(*args, **(kwargs or {}))
+            return self._draw(*args, **kwargs)
+        if func in _OTHER_DRAWS:
+            raise RuntimeError(f"{func.__name__} would draw from the global generator")
+        return func(*args, **kwargs)
+
+    def _fill(self, values: Tensor, mean: float = 0.0, std: float = 1.0) -> Tensor:
+        return values.copy_(mean + std * next(self._source))
+
+    def _draw(self, mean: Tensor, std: Tensor) -> Tensor:
+        return mean + std * next(self._source)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ them is left, nor any check of it before each call, which is what costs in small
 """
 
 import os
+import shlex
 import shutil
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -28,7 +29,15 @@ COMPILATION_ERRORS = (BackendCompilerFailed, InductorError)
 
 def has_compiler(device: torch.device) -> bool:
     """Whether there is a compiler for the device, working or not."""
-    return device.type != "cpu" or shutil.which(os.environ.get("CXX", "g++")) is not None
+    command = shlex.split(os.environ.get("CXX", "")) or ["g++"]
+    return device.type != "cpu" or shutil.which(command[0]) is not None
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def record(

@@ -1,6 +1,7 @@
 """The run directory: configuration, metrics, checkpoints, evaluation and figures of a training."""
 
 import csv
+import dataclasses
 import tempfile
 from collections import Counter
 from collections.abc import Mapping
@@ -61,7 +62,7 @@ class RunConfiguration:
         return cls(
             scenario_name,
             scenario,
-            _learners("learners", values["learners"]),
+            _learners(values["learners"], scenario.num_slots),
             algorithm_name,
             algorithm,
             TrainingParameters.from_dict(mapping("training", values["training"])),
@@ -87,12 +88,17 @@ def _learner(name: str, value: object) -> Learner:
         raise type(error)(f"{name}: {error}") from None
 
 
-def _learners(name: str, values: object) -> tuple[Learner, ...]:
-    learners: tuple[Learner, ...] = sequence(_learner, "a list of learners")(name, values)
-    twice = [learner for learner, times in Counter(learners).items() if times > 1]
+def _learners(values: object, num_slots: int) -> tuple[Learner, ...]:
+    """Learners that differ, where those without a horizon of their own have ``num_slots``."""
+    learners: tuple[Learner, ...] = sequence(_learner, "a list of learners")("learners", values)
+    resolved = [
+        dataclasses.replace(learner, num_slots=learner.num_slots or num_slots)
+        for learner in learners
+    ]
+    twice = [learner for learner, times in Counter(resolved).items() if times > 1]
     if twice:
         accepted = "learners that differ in scheme, seed or num_slots"
-        raise InputError(rejection(name, twice[0].to_dict(), accepted))
+        raise InputError(rejection("learners", twice[0].to_dict(), accepted))
     return learners
 
 

@@ -37,15 +37,15 @@ class LoggerParameters(Parameters):
     project: str = parameter(text, "hyuav")
 
 
-def learner_names(learners: Sequence[Learner]) -> list[str]:
+def learner_names(learners: Sequence[Learner], horizons: Sequence[int]) -> list[str]:
     """The scheme of each learner, with its horizon and seed where they tell learners apart."""
-    several_horizons = len({learner.num_slots for learner in learners}) > 1
+    several_horizons = len(set(horizons)) > 1
     several_seeds = len({learner.seed for learner in learners}) > 1
     return [
         learner.scheme
-        + (f"_T{learner.num_slots or 0}" if several_horizons else "")
+        + (f"_T{horizon}" if several_horizons else "")
         + (f"_seed{learner.seed}" if several_seeds else "")
-        for learner in learners
+        for learner, horizon in zip(learners, horizons, strict=True)
     ]
 
 
@@ -73,7 +73,7 @@ class Tracker:
         console: Console,
     ) -> None:
         self.run, self.training = run, training
-        self.names = learner_names(training.learners)
+        self.names = learner_names(training.learners, training.horizons)
         steps = tuple(f"loss_{name}" for name in training.steps)
         self._metrics = MetricsFile(run.metrics_file, (*METRIC_COLUMNS, *steps))
         self._wandb = _wandb_logger(run, configuration, logger)

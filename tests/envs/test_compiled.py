@@ -8,7 +8,7 @@ import pytest
 import torch
 from tensordict import TensorDictBase
 
-from hyuav import Scenario, make_env
+from hyuav import InputError, Scenario, make_env
 from hyuav.schemes.linear import ConstantVelocity
 from hyuav.system import SCHEMES
 
@@ -91,3 +91,20 @@ def test_without_a_compiler_the_environment_is_the_eager_one(
         for fast in (False, True)
     )
     torch.testing.assert_close(fallen_back, eager, rtol=0, atol=0)
+
+
+@COMPILES
+def test_actions_are_read_as_they_are_and_seeds_may_change_their_kind() -> None:
+    eager, fast = (
+        make_env(TWO_CLUSTERS, batch_size=64, seed=[*range(64)], compiled=compiled)
+        for compiled in (False, True)
+    )
+    actions = torch.rand(64, 2, dtype=torch.float64) * 2 - 1
+    first, second = (env.step(env.reset().set("action", actions))["next"] for env in (eager, fast))
+    torch.testing.assert_close(second["reward"], first["reward"], rtol=2e-5, atol=1e-4)
+    for env in (eager, fast):
+        env.set_seed(3)
+    first, second = (env.step(env.reset().set("action", actions))["next"] for env in (eager, fast))
+    torch.testing.assert_close(second["reward"], first["reward"], rtol=2e-5, atol=1e-4)
+    with pytest.raises(InputError, match=r"^action = \(64, 3\): expected shape \(64, 2\)$"):
+        fast.step(fast.reset().set("action", torch.zeros(64, 3)))

@@ -1,5 +1,6 @@
 """The compiled slots against the eager ones, and the change from one to the other."""
 
+import copy
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import pytest
 import torch
 
-from hyuav import Scenario
+from hyuav import InputError, Scenario
 from hyuav.learning import training as training_module
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.learning.cohort import Cohort, Learner
@@ -16,10 +17,13 @@ from hyuav.learning.training import Training, TrainingParameters
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 FADELESS = dataclasses.replace(SCENARIO, fading=False, edge_energy_budget=8.0, speed_limit="disc")
 LEARNERS = [Learner("hybrid", 1), Learner("relay", 2), Learner("jamming", 3)]
-SLOWLY_COMPILED = [
-    "ddpg",
-    pytest.param("td3", marks=pytest.mark.slow),
-    pytest.param("sac", marks=pytest.mark.slow),
+CASES = [
+    ("ddpg", SCENARIO),
+    ("ddpg", FADELESS),
+    ("td3", SCENARIO),
+    pytest.param("td3", FADELESS, marks=pytest.mark.slow),
+    pytest.param("sac", SCENARIO, marks=pytest.mark.slow),
+    pytest.param("sac", FADELESS, marks=pytest.mark.slow),
 ]
 
 
@@ -55,8 +59,7 @@ def assert_agree(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -
         torch.testing.assert_close(other[name], values, rtol=2e-3, atol=2e-5, msg=name)
 
 
-@pytest.mark.parametrize("name", SLOWLY_COMPILED)
-@pytest.mark.parametrize("scenario", [SCENARIO, FADELESS])
+@pytest.mark.parametrize(("name", "scenario"), CASES)
 def test_compiled_slots_are_the_eager_ones_up_to_rounding(name: str, scenario: Scenario) -> None:
     torch.manual_seed(0)
     eager, other = cohort(name, scenario), cohort(name, scenario)
@@ -130,6 +133,35 @@ def test_disturbing_one_learner_leaves_the_others_bit_for_bit_in_compiled_slots(
         assert not torch.equal(values[1], other[name][1])
 
 
+def test_a_restored_compiled_training_continues_bit_for_bit() -> None:
+    whole, interrupted, continued = (
+        trained(LEARNERS, compile="always", cohorts=1, num_episodes=8) for _ in range(3)
+    )
+    rewards = [episode.accumulated_reward for episode in whole.episodes()]
+    episodes = interrupted.episodes()
+    for _ in range(5):
+        next(episodes)
+    assert interrupted.cohorts[0].is_compiled
+    continued.load_state_dict(copy.deepcopy(interrupted.state_dict()))
+    after = [episode.accumulated_reward for episode in continued.episodes()]
+    assert all(torch.equal(one, two) for one, two in zip(rewards[5:], after, strict=True))
+    one, other = tensors(whole.cohorts[0]), tensors(continued.cohorts[0])
+    assert all(torch.equal(one[name], other[name]) for name in one)
+
+
+@pytest.mark.slow
+def test_mixed_horizons_and_schemes_compiled_on_threads_agree_with_eager_ones() -> None:
+    mixed = [Learner("hybrid", 1, 3), Learner("relay", 1), Learner("jamming", 2, 3), Learner()]
+    eager, graph = (
+        trained(mixed, compile=choice, cohorts=2, num_episodes=8) for choice in ("never", "always")
+    )
+    for one, two in zip(eager.episodes(), graph.episodes(), strict=True):
+        torch.testing.assert_close(
+            one.accumulated_reward, two.accumulated_reward, rtol=1e-3, atol=1e-3
+        )
+    assert all(cohort.is_compiled for cohort in graph.cohorts)
+
+
 def test_where_the_compiler_fails_training_goes_on_without_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -140,11 +172,12 @@ def test_where_the_compiler_fails_training_goes_on_without_it(
     monkeypatch.setattr(training_module, "COMPILE_SECONDS", 0.0)
     plain, other = (trained(LEARNERS, compile=choice) for choice in ("never", "auto"))
     expected = list(plain.episodes())
-    with (
-        torch._inductor.config.patch({"cpp.cxx": (str(broken),)}),
-        pytest.warns(UserWarning, match="training goes on without compiling"),
-    ):
-        episodes = list(other.episodes())
+    refusal = r"^compile = 'always': expected a working C\+\+ compiler [^\n]*$"
+    with torch._inductor.config.patch({"cpp.cxx": (str(broken),)}):
+        with pytest.warns(UserWarning, match="training goes on without compiling"):
+            episodes = list(other.episodes())
+        with pytest.raises(InputError, match=refusal):
+            list(trained(LEARNERS, compile="always").episodes())
     for one, two in zip(expected, episodes, strict=True):
         assert torch.equal(one.accumulated_reward, two.accumulated_reward)
 

@@ -162,6 +162,10 @@ def test_a_warm_start_begins_with_the_earlier_networks_and_targets() -> None:
         before = select_learner(earlier.best_weights, learner)
         assert all(torch.equal(own[key], before[key]) for key in own)
         assert all(torch.equal(best[key], before[key]) for key in own)
+    three = training(learners=seeds(1, 2, 3)).best_weights
+    for cohorts in (1, 2):
+        with pytest.raises(InputError, match="it holds 3 learners: expected 6 learners, or one"):
+            training(learners=seeds(*range(6)), cohorts=cohorts).warm_start(three)
     later.warm_start(select_learner(earlier.best_weights, 1))
     assert all(
         torch.equal(values, weights(later, 1)[key]) for key, values in weights(later, 0).items()

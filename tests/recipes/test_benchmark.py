@@ -17,6 +17,7 @@ from hyuav.benchmark.results import Results
 from hyuav.benchmark.tables import print_tables
 from hyuav.benchmark.work import Work
 from hyuav.errors import InputError
+from hyuav.recording import cores
 
 Call = Callable[..., None]
 
@@ -46,7 +47,7 @@ def test_the_benchmark_measures_prints_keeps_and_draws(
     rows = pd.read_parquet(tmp_path / "run" / "benchmark.parquet")
     content = json.loads((tmp_path / "run" / "benchmark.json").read_text())
     summary = pd.DataFrame(content["summary"])
-    assert content["machine"]["cores"] == plan.cores()
+    assert content["machine"]["cores"] == cores()
     assert content["machine"]["versions"]["torch"] is not None
     trained = summary[summary["part"] == "training"].set_index("entry")
     assert set(trained.index) == {"hyuav", "cleanrl", "stable_baselines3"}

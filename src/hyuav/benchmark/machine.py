@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from hyuav.benchmark.plan import cores
+from hyuav.recording import cores
 
 PACKAGES = ("hyuav", "torch", "torchrl", "stable_baselines3", "sbx-rl", "jax", "numpy")
 

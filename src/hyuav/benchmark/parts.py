@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 
 from hyuav import layouts
 from hyuav.benchmark.measure import Entry, Row, Worker, alternate, at_best_threads, job_seconds
-from hyuav.benchmark.plan import Benchmark, cores, devices, threads_to_try
+from hyuav.benchmark.plan import Benchmark, devices, threads_to_try
 from hyuav.benchmark.work import Work
+from hyuav.recording import cores
 from hyuav.scenario import Scenario
 
 Report = Callable[[str], None]

@@ -2,7 +2,6 @@
 
 import dataclasses
 import importlib.util
-import os
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,6 +10,7 @@ import torch
 from hyuav.benchmark.worker import LIBRARIES
 from hyuav.errors import InputError
 from hyuav.parameters import Parameters, choice, count, number, one_or_more, parameter, switch
+from hyuav.recording import cores
 
 PARTS = ("training", "environment", "job", "references", "scaling")
 PEERS = ("stable_baselines3", "sbx", "cleanrl", "torchrl")
@@ -57,13 +57,6 @@ class Benchmark(Parameters):
 def threads_to_try() -> list[int]:
     """One thread, and as many as there are cores."""
     return sorted({1, cores()})
-
-
-def cores() -> int:
-    """Processor cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def devices() -> list[str]:

@@ -11,26 +11,13 @@ from torch.fx import Graph, Node
 from torch.fx.experimental.proxy_tensor import make_fx
 from torchrl.envs import TransformedEnv
 
+from hyuav.envs.draws import GivenDraws
 from hyuav.recording import COMPILATION_ERRORS, compile_graph, has_compiler
-from hyuav.system import Tasks
 
 Flight = Callable[..., tuple[Tensor, ...]]
 
 OPTIONS = {"cpp.enable_floating_point_contract_flag": "fast", "pattern_matcher": False}
 """A product and a sum may be rounded once instead of twice; copies that order memory are kept."""
-
-
-class _Given:
-    """The draws of one slot, while it is recorded."""
-
-    def __init__(self, fading: Tensor | None, tasks: Tasks) -> None:
-        self._fading, self._tasks = fading, tasks
-
-    def fading(self) -> Tensor | None:
-        return self._fading
-
-    def tasks(self) -> Tasks:
-        return self._tasks
 
 
 class CompiledEnv(TransformedEnv):
@@ -69,6 +56,14 @@ class CompiledEnv(TransformedEnv):
             after["diagnostics"] = self.base_env.observation_spec["diagnostics"].zero()
         return after
 
+    def set_seed(self, seed: int | None = None, static_seed: bool = False) -> int | None:
+        """Seed the draws; those of one seed for all and of one per row differ in shape."""
+        before = type(self.base_env.draws)
+        following: int | None = super().set_seed(seed, static_seed)
+        if type(self.base_env.draws) is not before:
+            self._flight = None
+        return following
+
     def _flown(self, flight: Flight, tensordict: TensorDictBase) -> TensorDictBase:
         env = self.base_env
         ticket = env.draws.ticket(tasks=env.draws_tasks)
@@ -81,8 +76,15 @@ class CompiledEnv(TransformedEnv):
         return [*keys, ("diagnostics", "edge_load")] if self.base_env.diagnostics else keys
 
     def _inputs(self, tensordict: TensorDictBase) -> list[Tensor]:
-        """The entries (k, *batch_size) that a slot starts from."""
-        return [tensordict[key].movedim(-1, 0).contiguous() for key in self._input_keys]
+        """The entries (k, *batch_size) that a slot starts from, as the graph reads memory."""
+        self.base_env.require_action(tensordict["action"])
+        return [
+            tensordict[key]
+            .to(torch.int64 if key == "step_count" else torch.float32)
+            .movedim(-1, 0)
+            .contiguous()
+            for key in self._input_keys
+        ]
 
     def _entries(self, keys: list[Any], values: tuple[Tensor, ...]) -> TensorDictBase:
         entries = TensorDict({}, batch_size=self.batch_size, device=self.device)
@@ -116,7 +118,7 @@ class CompiledEnv(TransformedEnv):
         env, count = self.base_env, len(self._input_keys)
         draws = env.draws
         fading, tasks = draws.redeem(*arguments[count:])
-        env.draws = _Given(fading, tasks)
+        env.draws = GivenDraws(fading, tasks)
         try:
             after = super()._step(self._entries(self._input_keys, arguments[:count]))
         finally:

@@ -175,3 +175,24 @@ class RowDraws(Draws):
                 *numbers.shape[:axis], len(self._rows), *numbers.shape[axis + 1 :]
             )
         return numbers.index_select(axis, self._rows)
+
+
+class GivenDraws:
+    """One slot's fading and tasks, for an environment whose slot is recorded.
+
+    Args:
+        fading: powers (*batch_size, 3 U + 2), or None where fading is off.
+        tasks: of the slot, or None where none are needed.
+    """
+
+    def __init__(self, fading: Tensor | None, tasks: Tasks | None) -> None:
+        self._fading, self._tasks = fading, tasks
+
+    def fading(self) -> Tensor | None:
+        """The slot's fading."""
+        return self._fading
+
+    def tasks(self) -> Tasks:
+        """The slot's tasks."""
+        assert self._tasks is not None
+        return self._tasks

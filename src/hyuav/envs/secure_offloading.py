@@ -176,11 +176,19 @@ class SecureOffloadingEnv(EnvBase):
             raise InputError(rejection("position", position[outside][0].tolist(), accepted))
         return position
 
+    def require_action(self, action: Tensor) -> None:
+        """Accept an action (*batch_size, 2).
+
+        Raises:
+            InputError: it has another shape.
+        """
+        expected = (*self.batch_size, 2)
+        if action.shape != expected:
+            raise InputError(rejection("action", tuple(action.shape), f"shape {expected}"))
+
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         position, action = tensordict["position"], tensordict["action"]
-        if action.shape != position.shape:
-            accepted = f"shape {tuple(position.shape)}"
-            raise InputError(rejection("action", tuple(action.shape), accepted))
+        self.require_action(action)
         flown = self.system.move(position, action, self._norm_limit)
         slot = self._slot(flown.position)
         after = self._observation(slot, flown.off_map.unsqueeze(-1))

@@ -56,9 +56,12 @@ def load_weights_file(path: str | Path) -> dict[str, Tensor]:
     """
     weights = load_checkpoint(path, "weights")
     by_name = isinstance(weights, dict) and all(
-        isinstance(values, Tensor) and values.is_floating_point() and bool(values.isfinite().all())
+        isinstance(values, Tensor)
+        and values.is_floating_point()
+        and values.ndim >= 2
+        and bool(values.isfinite().all())
         for values in weights.values()
     )
-    if not by_name:
+    if not by_name or not weights:
         raise InputError(rejection("checkpoint", str(path), "finite weights by name"))
     return weights

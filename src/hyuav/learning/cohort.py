@@ -16,7 +16,7 @@ from hyuav.learning.replay import as_transition, make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import copy_weights, draw_weights, replace_learners
 from hyuav.parameters import Parameters, choice, count, optional, parameter
-from hyuav.randomness import RowStream, given_normals, standard_normal, uniform
+from hyuav.randomness import RowStream, derived_seed, given_normals, standard_normal, uniform
 from hyuav.scenario import Scenario
 from hyuav.system import SCHEMES
 
@@ -192,11 +192,13 @@ class Cohort:
             self.env.base_env.schemes if scheme is None else scheme,
             (len(self.learners), episodes),
             self.env.device,
-            [seed] * len(self.learners),
+            [derived_seed(seed, "evaluation")] * len(self.learners),
             clock=self.clock,
         )
-        flown = env.rollout(self.scenario.num_slots, self.algorithm.actor)
-        evaluation: Tensor = flown["next", "episode_reward"][..., -1, 0].mean(dim=-1)
+        state = env.reset()
+        for _ in range(self.scenario.num_slots):
+            state = env.step_mdp(env.step(self.algorithm.actor(state)))
+        evaluation: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
         return evaluation
 
     def keep_best(self, evaluation: Tensor) -> None:
@@ -232,8 +234,10 @@ class Cohort:
         for name, stream in self._streams.items():
             stream.set_state(state["random"][name])
         self.episode, self.updates = state["episode"], state["updates"]
-        self.best_evaluation = state["best_evaluation"]
-        self.best_weights = state["best_weights"]
+        self.best_evaluation = state["best_evaluation"].to(self.env.device)
+        self.best_weights = {
+            name: values.to(self.env.device) for name, values in state["best_weights"].items()
+        }
 
 
 def _mean(losses: list[dict[str, Tensor]]) -> dict[str, Tensor]:

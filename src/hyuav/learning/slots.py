@@ -8,7 +8,6 @@ training may change over between any two episodes and a checkpoint serves both.
 """
 
 import functools
-import math
 from collections.abc import Mapping
 
 import torch
@@ -17,25 +16,12 @@ from torch import Tensor
 from torchrl.data import ReplayBuffer
 from torchrl.envs import TransformedEnv
 
+from hyuav.envs.draws import GivenDraws
 from hyuav.learning.algorithms import Algorithm, GradientStep
 from hyuav.learning.replay import TRANSITION, as_transition, sampled_slots
 from hyuav.randomness import given_normals
 from hyuav.recording import compile_function
 from hyuav.system import Tasks
-
-
-class _GivenDraws:
-    """One slot's fading and tasks, handed to the environment."""
-
-    def __init__(self, fading: Tensor | None, tasks: Tensor | None) -> None:
-        self._fading, self._tasks = fading, tasks
-
-    def fading(self) -> Tensor | None:
-        return self._fading
-
-    def tasks(self) -> Tasks:
-        assert self._tasks is not None
-        return Tasks(*self._tasks.unbind(dim=1))
 
 
 class CompiledSlots:
@@ -80,10 +66,9 @@ class CompiledSlots:
         }
         examples = self._examples(batch_size)
         self._names = tuple(examples)
-        period = math.lcm(*(step.every for step in algorithm.steps), algorithm.target_every)
         self._programs = {
             taken: compile_function(functools.partial(self._slot, taken), [*examples.values()])
-            for taken in {algorithm.due(index) for index in range(1, period + 1)}
+            for taken in algorithm.all_due
         }
 
     def fly(
@@ -174,7 +159,8 @@ class CompiledSlots:
 
     def _fly_slot(self, given: Mapping[str, Tensor]) -> TensorDictBase:
         env, draws = self._env, self._env.base_env.draws
-        env.base_env.draws = _GivenDraws(given.get("fading"), given.get("tasks"))
+        tasks = Tasks(*given["tasks"].unbind(dim=1)) if "tasks" in given else None
+        env.base_env.draws = GivenDraws(given.get("fading"), tasks)
         try:
             with given_normals(iter([given["exploration"]])):
                 action = self._algorithm.explorer(self._carrier.clone(False))

@@ -2,27 +2,27 @@
 
 import dataclasses
 import math
-import os
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
 import torch
 from torch import Tensor
 
+from hyuav.envs.arguments import as_device
 from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
 from hyuav.parameters import Parameters, choice, count, parameter, switch
-from hyuav.recording import COMPILATION_ERRORS, has_compiler
+from hyuav.recording import COMPILATION_ERRORS, cores, has_compiler
 from hyuav.scenario import Scenario
 
 COMPILE_SECONDS = 20.0
-"""What compiling the programs of one cohort takes, on a core of its own."""
+"""What compiling one program takes."""
 
 SECONDS_SAVED = (0.003, 0.0007)
 """Saved per slot, and besides that per learner and slot."""
@@ -40,7 +40,7 @@ class TrainingParameters(Parameters):
     evaluation_seed: int = parameter(count(0), 20_000)
     clock: bool = parameter(switch, False)
     compile: str = parameter(choice("auto", "always", "never"), "auto")
-    cohorts: int = parameter(count(), os.cpu_count() or 1)
+    cohorts: int = parameter(count(), cores())
     """Groups in which the learners of one horizon are trained, each on a thread of its own."""
 
     def __post_init__(self) -> None:
@@ -81,7 +81,7 @@ class Training:
         device: of all tensors.
 
     Raises:
-        InputError: an unknown device.
+        InputError: an unknown device; later, where it must be compiled, no working compiler.
         InputTypeError: an argument of the wrong type.
     """
 
@@ -102,7 +102,8 @@ class Training:
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
         self.scenario, self.parameters = scenario, parameters
         self.learners = tuple(learners)
-        self._members = _partition(self.horizons, parameters.cohorts)
+        on_cpu = as_device(device).type == "cpu"
+        self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1)
         self.cohorts = [
             Cohort(
                 dataclasses.replace(scenario, num_slots=self.horizons[members[0]]),
@@ -158,7 +159,7 @@ class Training:
     def episodes(self) -> Iterator[Episode]:
         """Train until ``num_episodes`` are flown; report each episode as it ends."""
         self._compiles = self._compiling_pays()
-        threads = min(len(self.cohorts), os.cpu_count() or 1)
+        threads = min(len(self.cohorts), cores())
         with ThreadPoolExecutor(threads) as pool:
             while self.episode < self.parameters.num_episodes:
                 yield self._train_episode(pool)
@@ -166,7 +167,8 @@ class Training:
     def _train_episode(self, pool: ThreadPoolExecutor) -> Episode:
         if self._compiles and all(cohort.learns for cohort in self.cohorts):
             self._compile()
-        if len(self.cohorts) > 1 and all(cohort.is_compiled for cohort in self.cohorts):
+        on_cpu = self.cohorts[0].env.device.type == "cpu"
+        if on_cpu and len(self.cohorts) > 1 and all(c.is_compiled for c in self.cohorts):
             with _one_thread_each():
                 flown = list(pool.map(Cohort.fly, self.cohorts))
         else:
@@ -191,17 +193,19 @@ class Training:
             episodes * cohort.scenario.num_slots * (per_slot + per_learner * len(cohort.learners))
             for cohort in self.cohorts
         )
-        kinds = {len(cohort.learners) for cohort in self.cohorts}
-        return saved > COMPILE_SECONDS * len(kinds)
+        kinds = {(len(cohort.learners), cohort.scenario.num_slots) for cohort in self.cohorts}
+        return saved > COMPILE_SECONDS * len(kinds) * len(self.cohorts[0].algorithm.all_due)
 
     def _compile(self) -> None:
         try:
-            for cohort in self.cohorts:
-                cohort.compile()
+            with _one_thread_each() if len(self.cohorts) > 1 else nullcontext():
+                for cohort in self.cohorts:
+                    cohort.compile()
         except COMPILATION_ERRORS as error:
-            if self.parameters.compile == "always":
-                raise
             reason = " ".join(str(error).split())[:200]
+            if self.parameters.compile == "always":
+                accepted = f"a working C++ compiler ({reason})"
+                raise InputError(rejection("compile", "always", accepted)) from None
             warnings.warn(f"training goes on without compiling ({reason})", stacklevel=2)
             self._compiles = False
 
@@ -241,9 +245,13 @@ class Training:
             InputError: the weights are of another algorithm, of other sizes or of another number
                 of learners.
         """
+        several = count_learners(weights)
+        if several not in (1, len(self.learners)):
+            accepted = f"expected {len(self.learners)} learners, or one"
+            raise InputError(f"checkpoint: it holds {several} learners: {accepted}")
         for cohort, members in zip(self.cohorts, self._members, strict=True):
             own = weights
-            if count_learners(weights) == len(self.learners):
+            if several > 1:
                 own = join_learners([select_learner(weights, index) for index in members])
             load_weights(cohort.algorithm.loss, own)
 

@@ -1,5 +1,6 @@
 """What every algorithm consists of; the training loop knows nothing else of it."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -72,8 +73,16 @@ class Algorithm:
 
     def due(self, index: int) -> tuple[bool, ...]:
         """Which gradient steps the update of this index takes, and last whether targets follow."""
-        periods = (*(step.every for step in self.steps), self.target_every)
-        return tuple(index % period == 0 for period in periods)
+        return tuple(index % period == 0 for period in self._periods)
+
+    @property
+    def _periods(self) -> tuple[int, ...]:
+        return (*(step.every for step in self.steps), self.target_every)
+
+    @property
+    def all_due(self) -> set[tuple[bool, ...]]:
+        """Every combination of steps that an update takes."""
+        return {self.due(index) for index in range(1, math.lcm(*self._periods) + 1)}
 
     def update_networks(self, batch: TensorDictBase, index: int) -> dict[str, Tensor]:
         """Take the gradient steps, eq. 9 and 10 for DDPG, on one mini-batch of each learner.
@@ -86,8 +95,8 @@ class Algorithm:
             the mean loss (N,) of each step that was taken, by the step's name.
         """
         losses = {}
-        for step in self.steps:
-            if index % step.every:
+        for step, due in zip(self.steps, self.due(index), strict=False):
+            if not due:
                 continue
             loss = step.loss(batch).mean(dim=-1)
             step.optimizer.zero_grad()
@@ -98,7 +107,7 @@ class Algorithm:
 
     def update_targets(self, index: int) -> None:
         """Let the target networks follow, in every ``target_every``-th update."""
-        if index % self.target_every == 0:
+        if self.due(index)[-1]:
             self.target.step()
 
     @property
