@@ -13,6 +13,7 @@ from hyuav.learning import training as training_module
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.training import Training, TrainingParameters
+from hyuav.system import SCHEMES
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 FADELESS = dataclasses.replace(SCENARIO, fading=False, edge_energy_budget=8.0, speed_limit="disc")
@@ -105,9 +106,16 @@ def trained(learners: list[Learner], **changes: Any) -> Training:
     )
 
 
-@pytest.mark.parametrize("cohorts", [1, 2])
-def test_a_compiled_training_agrees_with_an_eager_one(cohorts: int) -> None:
-    learners = [Learner("hybrid", seed) for seed in range(4)]
+@pytest.mark.parametrize(
+    ("cohorts", "learners"),
+    [
+        (1, [Learner(scheme, 4) for scheme in SCHEMES]),  # who share their luck
+        (2, [Learner("hybrid", seed) for seed in range(4)]),
+    ],
+)
+def test_a_compiled_training_agrees_with_an_eager_one(
+    cohorts: int, learners: list[Learner]
+) -> None:
     eager, graph = (
         trained(learners, compile=choice, cohorts=cohorts) for choice in ("never", "always")
     )

@@ -99,6 +99,17 @@ def test_how_learners_are_divided_into_cohorts_changes_nothing_but_rounding() ->
         )
 
 
+def test_many_learners_form_several_cohorts_for_each_thread() -> None:
+    def sizes(learners: int, cohorts: int) -> list[int]:
+        trained = training(learners=seeds(*range(learners)), cohorts=cohorts)
+        return [len(cohort.learners) for cohort in trained.cohorts]
+
+    assert sizes(10, 2) == [5, 5]
+    assert sizes(15, 2) == [4, 4, 4, 3]
+    assert sizes(10, 1) == [5, 5]
+    assert sizes(3, 8) == [1, 1, 1]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_disturbing_one_learner_leaves_the_others_bit_for_bit(name: str) -> None:
     plain, disturbed = (training(name, seeds(1, 2, 3), cohorts=1) for _ in range(2))

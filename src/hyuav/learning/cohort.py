@@ -142,9 +142,9 @@ class Cohort:
         slots, draws = self.scenario.num_slots, self.env.base_env.draws
         blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
         if self.scenario.fading:
-            blocks["fading"] = draws.take_fading(slots)
+            blocks["fading"] = draws.take_fading(slots).contiguous()  # where rows are shared
         if self.env.base_env.system.edge_can_saturate:
-            blocks["tasks"] = draws.take_tasks(slots)
+            blocks["tasks"] = draws.take_tasks(slots).contiguous()
         carrier = self.collector._carrier
         reward, losses = self._compiled.fly(carrier, blocks, self.updates)
         self.updates += slots

@@ -24,6 +24,9 @@ from hyuav.scenario import Scenario
 COMPILE_SECONDS = 20.0
 """What compiling one program takes."""
 
+LARGEST_COHORT = 5
+"""Learners whose weights, moments and targets still fit a core's cache together."""
+
 SECONDS_SAVED = (0.003, 0.0007)
 """Saved per slot, and besides that per learner and slot."""
 
@@ -41,7 +44,7 @@ class TrainingParameters(Parameters):
     clock: bool = parameter(switch, False)
     compile: str = parameter(choice("auto", "always", "never"), "auto")
     cohorts: int = parameter(count(), cores())
-    """Groups in which the learners of one horizon are trained, each on a thread of its own."""
+    """Groups of learners that are trained at the same time, each on a thread of its own."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -103,7 +106,8 @@ class Training:
         self.scenario, self.parameters = scenario, parameters
         self.learners = tuple(learners)
         on_cpu = as_device(device).type == "cpu"
-        self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1)
+        size = LARGEST_COHORT if on_cpu else math.inf
+        self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
         self.cohorts = [
             Cohort(
                 dataclasses.replace(scenario, num_slots=self.horizons[members[0]]),
@@ -159,7 +163,7 @@ class Training:
     def episodes(self) -> Iterator[Episode]:
         """Train until ``num_episodes`` are flown; report each episode as it ends."""
         self._compiles = self._compiling_pays()
-        threads = min(len(self.cohorts), cores())
+        threads = min(len(self.cohorts), self.parameters.cohorts)
         with ThreadPoolExecutor(threads) as pool:
             while self.episode < self.parameters.num_episodes:
                 yield self._train_episode(pool)
@@ -288,12 +292,16 @@ class Training:
             raise InputError(f"checkpoint: not of a training like this one ({reason})") from None
 
 
-def _partition(horizons: Sequence[int], cohorts: int) -> list[list[int]]:
-    """Group learners of equal horizon, and divide each group into near-equal parts."""
+def _partition(horizons: Sequence[int], threads: int, largest: float) -> list[list[int]]:
+    """Group learners of equal horizon, and divide each group into near-equal parts.
+
+    There are as many parts as threads, or several times as many where they would be too large.
+    """
     parts = []
     for horizon in dict.fromkeys(horizons):
         members = [index for index, own in enumerate(horizons) if own == horizon]
-        size = math.ceil(len(members) / cohorts)
+        rounds = max(math.ceil(len(members) / (threads * largest)), 1)
+        size = math.ceil(len(members) / (threads * rounds))
         parts += [members[start : start + size] for start in range(0, len(members), size)]
     return parts
 
