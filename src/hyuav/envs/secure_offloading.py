@@ -189,6 +189,7 @@ class SecureOffloadingEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         position, action = tensordict["position"], tensordict["action"]
         self.require_action(action)
+        action = action.to(torch.float32)  # as specified, whatever is given
         flown = self.system.move(position, action, self._norm_limit)
         slot = self._slot(flown.position)
         after = self._observation(slot, flown.off_map.unsqueeze(-1))
