@@ -7,9 +7,7 @@ from typing import Any
 
 import pandas as pd
 import torch
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from torch import Tensor
 
 from hyuav.errors import InputError, rejection
@@ -24,6 +22,7 @@ from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
 from hyuav.schemes.linear import ConstantVelocity, ja_lt, re_lt
 from hyuav.schemes.optimum import FlightPolicy, solve
+from hyuav.terminal import results_table
 from hyuav.tracking import LoggerParameters, Tracker
 
 LEARNED = {"hybrid": "proposed", "relay": "re_ot", "jamming": "ja_ot"}
@@ -196,23 +195,16 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         f"{summary['scenario']}, T = {summary['num_slots']}: mean of {summary['episodes']} "
         "episodes on the same fading, 95 % interval"
     )
-    table = Table(
-        title=title,
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        collapse_padding=True,
-    )
-    table.add_column("Scheme", no_wrap=True)
-    for heading in (
+    table = results_table(
+        title,
+        "Scheme",
         "Secrecy sum-rate\n(bps/Hz)",
         "own\noptimum",
         "hybrid\noptimum",
         "relay\nslots",
         "UEs off-\nloading",
         "off\nmap",
-    ):
-        table.add_column(heading, justify="right", no_wrap=True)
+    )
     for scheme, result in summary["schemes"].items():
         rate = result["secrecy_sum_rate"]
         table.add_row(

@@ -3,13 +3,13 @@
 from typing import Any
 
 import pandas as pd
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from hyuav.benchmark.arithmetic import update_flops
 from hyuav.benchmark.results import Results
 from hyuav.benchmark.work import Work
+from hyuav.terminal import results_table
 
 LABELS = {
     "hyuav": "HyUAV",
@@ -59,20 +59,6 @@ def print_tables(results: Results, console: Console) -> None:
                 console.print(_scaling(rows, str(part)))
 
 
-def _table(title: str, first: str, *headings: str) -> Table:
-    table = Table(
-        title=title,
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        collapse_padding=True,
-    )
-    table.add_column(first, no_wrap=True)
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
-    return table
-
-
 def _training(rows: pd.DataFrame, results: Results) -> Table:
     flops = update_flops(int(rows["num_ues"].iloc[0]) + 5, Work.hidden_sizes, Work.batch_size)
     floors = "".join(
@@ -81,7 +67,7 @@ def _training(rows: pd.DataFrame, results: Results) -> Table:
         for device, rate in results.matrix_rates.items()
     )
     title = f"Training: steps of all learners per second, median and range{floors}"
-    table = _table(title, "Entry", "Steps/s", "to SB3", "to SBX", "of floor", "threads")
+    table = results_table(title, "Entry", "Steps/s", "to SB3", "to SBX", "of floor", "threads")
     for _, row in rows.iterrows():
         table.add_row(
             label(row),
@@ -96,7 +82,7 @@ def _training(rows: pd.DataFrame, results: Results) -> Table:
 
 def _costs(rows: pd.DataFrame) -> Table:
     title = "Before the first measured step, and the most memory held"
-    table = _table(title, "Entry", "import (s)", "build (s)", "compile, warm up (s)", "MiB")
+    table = results_table(title, "Entry", "import (s)", "build (s)", "compile, warm up (s)", "MiB")
     for _, row in rows.iterrows():
         seconds = (row[f"{name}_seconds"] for name in ("start_up", "build", "warm_up"))
         memory = f"{row['peak_mebibytes']:.0f}"
@@ -106,7 +92,7 @@ def _costs(rows: pd.DataFrame) -> Table:
 
 def _environment(rows: pd.DataFrame, numpy: float) -> Table:
     title = f"Environment: slots/s; the NumPy environment flies one helper at {numpy:,.0f}"
-    table = _table(
+    table = results_table(
         title, "Batch", "eager", "x NumPy", "of floor", "compiled", "x NumPy", "of floor", "draws"
     )
     for (device, helpers), group in rows[rows["entry"] != "numpy"].groupby(["device", "helpers"]):
@@ -127,7 +113,7 @@ def _environment(rows: pd.DataFrame, numpy: float) -> Table:
 def _job(rows: pd.DataFrame) -> Table:
     episodes = rows["median"] * rows["seconds"] / rows["num_slots"] / rows["learners"]
     title = f"Whole job: {episodes.iloc[0]:.0f} episodes, start to finish"
-    table = _table(title, "Entry", "seconds", "times as fast as SB3", "MiB")
+    table = results_table(title, "Entry", "seconds", "times as fast as SB3", "MiB")
     for _, row in rows.iterrows():
         table.add_row(
             label(row),
@@ -139,7 +125,7 @@ def _job(rows: pd.DataFrame) -> Table:
 
 
 def _references(rows: pd.DataFrame, jobs: pd.DataFrame) -> Table:
-    table = _table("Beside a training", "Work", "seconds", "of the whole job")
+    table = results_table("Beside a training", "Work", "seconds", "of the whole job")
     job = jobs[jobs["entry"] == "hyuav"]["seconds"]
     for _, row in rows.iterrows():
         share = 100 * row["seconds"] / float(job.iloc[0]) if len(job) else None
@@ -148,7 +134,7 @@ def _references(rows: pd.DataFrame, jobs: pd.DataFrame) -> Table:
 
 
 def _scaling(rows: pd.DataFrame, part: str) -> Table:
-    table = _table(
+    table = results_table(
         f"Training against the number of {HEADINGS[part]}",
         HEADINGS[part],
         *("Entry", "Steps/s", "to SB3", "of floor", "warm s", "MiB"),
