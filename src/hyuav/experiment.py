@@ -125,7 +125,7 @@ def select_initial_weights(
         pass
     weights = training.best_weights
     training.load_weights(weights)
-    earned = {rule: training.evaluate(rule) for rule in rules}
+    earned = {rule: training.evaluate(rule).reward for rule in rules}
     chosen, best = [], []
     for learner in learners:
         own = torch.tensor([owner == learner.seed for owner in owners])

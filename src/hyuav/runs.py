@@ -30,10 +30,14 @@ METRIC_COLUMNS = (
     "num_slots",
     "accumulated_reward",
     "evaluation",
+    "sum_rate",
     "best_evaluation",
     "seconds",
 )
-"""Columns of ``metrics.csv``; the mean loss of each gradient step follows."""
+"""Columns of ``metrics.csv``; the mean loss of each gradient step follows.
+
+``evaluation`` is noise-free, ``sum_rate`` the same without the off-map penalty.
+"""
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,8 @@ class Tracker:
             **{f"loss_{name}": loss.tolist() for name, loss in episode.losses.items()},
         }
         if episode.evaluation is not None:
-            columns["evaluation"] = episode.evaluation.tolist()
+            columns["evaluation"] = episode.evaluation.reward.tolist()
+            columns["sum_rate"] = episode.evaluation.sum_rate.tolist()
             columns["best_evaluation"] = self.training.best_evaluation.tolist()
         return [
             {

@@ -67,9 +67,9 @@ def test_the_best_weights_are_those_of_the_best_evaluation() -> None:
     kept = [weights(trained, learner) for learner in range(4)]
     for episode in trained.episodes():
         assert episode.evaluation is not None
-        for learner in (episode.evaluation > best).nonzero().flatten().tolist():
+        for learner in (episode.evaluation.reward > best).nonzero().flatten().tolist():
             kept[learner] = weights(trained, learner)
-        best = torch.maximum(best, episode.evaluation)
+        best = torch.maximum(best, episode.evaluation.reward)
         assert torch.equal(trained.best_evaluation, best)
     for learner, own in enumerate(kept):
         best_weights = select_learner(trained.best_weights, learner)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from tensordict import TensorDictBase
@@ -34,6 +34,15 @@ class Learner(Parameters):
     seed: int = parameter(count(0), 0)
     num_slots: int | None = parameter(optional(count()), None, symbol="T")
     """The horizon; the scenario's where it is None."""
+
+
+class Earned(NamedTuple):
+    """What actors earn without noise, on average over the same episodes."""
+
+    reward: Tensor
+    """(N,) bps/Hz, accumulated, with penalties."""
+    sum_rate: Tensor
+    """(N,) bps/Hz, the accumulated secrecy sum-rate alone."""
 
 
 class Cohort:
@@ -176,16 +185,13 @@ class Cohort:
         return losses
 
     @torch.no_grad()
-    def evaluate(self, episodes: int, seed: int, scheme: str | None = None) -> Tensor:
+    def evaluate(self, episodes: int, seed: int, scheme: str | None = None) -> Earned:
         """Fly the current actors without noise, all of them through the same fading.
 
         Args:
             episodes: flown by each learner.
             seed: of the fading.
             scheme: that all learners fly; None for each learner's own.
-
-        Returns:
-            (N,) mean accumulated reward in bps/Hz.
         """
         env = make_env(
             self.scenario,
@@ -195,11 +201,12 @@ class Cohort:
             [derived_seed(seed, "evaluation")] * len(self.learners),
             clock=self.clock,
         )
-        state = env.reset()
+        state, off_map = env.reset(), torch.zeros(len(self.learners), device=env.device)
         for _ in range(self.scenario.num_slots):
             state = env.step_mdp(env.step(self.algorithm.actor(state)))
-        evaluation: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
-        return evaluation
+            off_map += state["off_map"].squeeze(-1).float().mean(dim=-1)
+        reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
+        return Earned(reward, reward + self.scenario.off_map_penalty * off_map)
 
     def keep_best(self, evaluation: Tensor) -> None:
         """Where a learner was never better than ``evaluation`` (N,), its weights are the best."""

@@ -15,7 +15,7 @@ from torch import Tensor
 from hyuav.envs.arguments import as_device
 from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.cohort import Cohort, Learner
+from hyuav.learning.cohort import Cohort, Earned, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
 from hyuav.parameters import Parameters, choice, count, parameter, switch
 from hyuav.recording import COMPILATION_ERRORS, cores, has_compiler
@@ -65,8 +65,8 @@ class Episode:
     """(N,) bps/Hz, with exploration and penalties, undiscounted."""
     losses: dict[str, Tensor]
     """(N,) mean loss of the episode's updates, by gradient step; NaN where there was none."""
-    evaluation: Tensor | None
-    """(N,) bps/Hz, noise-free accumulated reward, in the episodes that end with an evaluation."""
+    evaluation: Earned | None
+    """Without noise, in the episodes that end with an evaluation."""
 
 
 class Training:
@@ -217,27 +217,28 @@ class Training:
         last = self.episode == self.parameters.num_episodes
         return last or self.episode % self.parameters.evaluation_every == 0
 
-    def evaluate(self, scheme: str | None = None) -> Tensor:
+    def evaluate(self, scheme: str | None = None) -> Earned:
         """Fly the current actors without noise, all through the same fading every time.
 
         Args:
             scheme: that all learners fly; None for each learner's own.
-
-        Returns:
-            (N,) mean accumulated reward in bps/Hz.
         """
-        return self._in_order(self._evaluate(scheme))
+        return self._together(self._evaluate(scheme))
 
-    def _evaluate(self, scheme: str | None) -> list[Tensor]:
+    def _evaluate(self, scheme: str | None) -> list[Earned]:
         episodes, seed = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
         return [cohort.evaluate(episodes, seed, scheme) for cohort in self.cohorts]
 
-    def _keep_best(self) -> Tensor:
+    def _together(self, evaluations: Sequence[Earned]) -> Earned:
+        rewards, sum_rates = zip(*evaluations, strict=True)
+        return Earned(self._in_order(rewards), self._in_order(sum_rates))
+
+    def _keep_best(self) -> Earned:
         """Evaluate; where a learner has never been better, its weights are the best so far."""
         evaluations = self._evaluate(None)
         for cohort, evaluation in zip(self.cohorts, evaluations, strict=True):
-            cohort.keep_best(evaluation)
-        return self._in_order(evaluations)
+            cohort.keep_best(evaluation.reward)
+        return self._together(evaluations)
 
     def load_weights(self, weights: dict[str, Tensor]) -> None:
         """Put weights into all learners' networks and targets.
