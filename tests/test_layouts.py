@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hyuav import InputError, InputTypeError, Scenario
-from hyuav.layouts import clusters, disk
+from hyuav.layouts import clusters, disk, random_layout
 
 SEEDS = st.integers(0, 2**40)
 CENTER = st.tuples(st.floats(-50, 50), st.floats(-50, 50))
@@ -133,3 +133,23 @@ def test_clusters_that_cannot_be_drawn_are_refused(
     with pytest.raises(error, match=f"^{field}") as caught:
         clusters(**{"seed": 0, **arguments})
     assert "\n" not in str(caught.value)
+
+
+def test_random_layouts_are_disks_and_two_clusters_in_turn() -> None:
+    for seed in range(1000, 1040, 2):
+        assert random_layout(seed) == disk(10, seed=seed)
+        points = random_layout(seed + 1)
+        sizes = [n for n in range(3, 8) if points == clusters([n, 10 - n], seed=seed + 1)]
+        assert len(sizes) == 1
+
+
+def test_the_clusters_of_random_layouts_have_all_sizes() -> None:
+    first = [np.array(random_layout(seed)) for seed in range(1, 201, 2)]
+    near = [(distances(points, points[0]) <= 30.0).sum() for points in first]
+    assert set(near) == {3, 4, 5, 6, 7}
+    assert min(near.count(size) for size in range(3, 8)) >= 10
+
+
+def test_a_random_layout_needs_a_seed() -> None:
+    with pytest.raises(InputError, match=r"^seed = -1: expected a whole number >= 0"):
+        random_layout(-1)

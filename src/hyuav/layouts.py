@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import torch
 
 from hyuav.parameters import count, number, sequence
+from hyuav.randomness import derived_seed
 from hyuav.scenario import Point
 
 _length = number(0.0)
@@ -69,6 +70,28 @@ def clusters(
         y = center[1] + spread * float(angle.sin())
         positions.extend(_disk(size, cluster_radius, (x, y), generator))
     return tuple(positions)
+
+
+def random_layout(seed: int) -> tuple[Point, ...]:
+    """Draw one of a series of layouts of 10 UEs: even seeds draw a disk, odd ones two clusters.
+
+    The clusters' sizes are drawn too, from 3 + 7 to 7 + 3.
+
+    Args:
+        seed: the same seed draws the same layout.
+
+    Returns:
+        10 positions (x, y) in metres.
+
+    Raises:
+        InputError: ``seed`` is negative or of the wrong type.
+    """
+    seed = count(0)("seed", seed)
+    if seed % 2 == 0:
+        return disk(10, seed=seed)
+    generator = torch.Generator().manual_seed(derived_seed(seed, "cluster sizes"))
+    first = int(torch.randint(3, 8, (), generator=generator))
+    return clusters([first, 10 - first], seed=seed)
 
 
 def _disk(
