@@ -28,8 +28,12 @@ Config = dict[str, Any]
 Record = TypeVar("Record", bound=Parameters)
 
 
-def register() -> None:
-    """Offer the presets and the algorithms as the groups ``scenario`` and ``algorithm``."""
+def register(groups: Iterable[str]) -> None:
+    """Offer the presets and the algorithms as the groups ``scenario`` and ``algorithm``.
+
+    Args:
+        groups: that are wanted. Where one is not, its name is free for a plain entry.
+    """
     store = ConfigStore.instance()
     for name in PRESETS:
         node = {"name": name, **Scenario.preset(name).to_dict()}
@@ -37,6 +41,8 @@ def register() -> None:
     for name, algorithm in ALGORITHMS.items():
         node = {"name": name, **algorithm().to_dict()}
         store.store(group="algorithm", name=name, node=node)
+    for group in {"scenario", "algorithm"}.difference(groups):
+        del store.repo[group]
 
 
 def recipe(
@@ -44,7 +50,7 @@ def recipe(
     options: type[Parameters],
     *,
     groups: Mapping[str, str],
-    sections: Mapping[str, type[Parameters]],
+    sections: Mapping[str, Callable[[], Parameters]],
     run_directory: str,
 ) -> Callable[[Callable[[Config, Path], None]], Callable[[], None]]:
     """Turn a function into a command with Hydra's overrides.
@@ -57,10 +63,9 @@ def recipe(
         name: of the recipe.
         options: the typed defaults at the top of the configuration.
         groups: Hydra's groups and the member chosen by default.
-        sections: the typed defaults of the configuration's other sections.
+        sections: what makes the typed defaults of the configuration's other sections.
         run_directory: pattern of the directory in which a run keeps its files.
     """
-    register()
     store = ConfigStore.instance()
     node: dict[str, Any] = options().to_dict()
     node |= {section: parameters().to_dict() for section, parameters in sections.items()}
@@ -93,6 +98,7 @@ def recipe(
         def command() -> None:
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
+            register(groups)
             one_line = mock.patch.object(argparse.ArgumentParser, "print_usage")
             try:
                 with one_line:

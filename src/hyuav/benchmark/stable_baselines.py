@@ -9,6 +9,7 @@ zero. Truncated episodes bootstrap. The environment is handed over without a mon
 import importlib
 from typing import Any
 
+import gymnasium
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -45,16 +46,21 @@ class StableBaselines3:
 
     Args:
         work: to do.
+        env: to do it in; None for the NumPy environment.
     """
 
     width = 1
 
-    def __init__(self, work: Work) -> None:
+    def __init__(
+        self,
+        work: Work,
+        env: gymnasium.Env[NDArray[np.float32], NDArray[np.float32]] | None = None,
+    ) -> None:
         self.warm_up_slots = work.batch_size + SLOTS_AT_A_TIME
         library = importlib.import_module(self._library)
         self.model: Any = library.DDPG(
             "MlpPolicy",
-            DummyVecEnv([lambda: NumpyEnv(work.scenario, seed=work.seed)]),
+            DummyVecEnv([lambda: env or NumpyEnv(work.scenario, seed=work.seed)]),
             learning_rate=work.actor_learning_rate,
             buffer_size=work.replay_size,
             learning_starts=work.batch_size - 1,  # trains once more than these are stored

@@ -168,7 +168,7 @@ def solve_horizons(
     longest = max(scenarios)
     draws = count(2)("draws", draws)
     evaluation_draws = count(2)("evaluation_draws", evaluation_draws)
-    _require_resolution(resolution, scenario.map_side, longest)
+    require_resolution(resolution, scenario.map_side, longest)
     root = torch.Generator().manual_seed(as_seed(seed))
     map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root).tolist()
 
@@ -198,7 +198,13 @@ def _with_horizons(scenario: Scenario, horizons: Sequence[int]) -> dict[int, Sce
     return {n: dataclasses.replace(scenario, num_slots=n) for n in horizons}
 
 
-def _require_resolution(resolution: float, map_side: float, num_slots: int) -> None:
+def require_resolution(resolution: float, map_side: float, num_slots: int) -> None:
+    """Accept a grid spacing in m for which the tables of a horizon fit :data:`MEMORY_LIMIT`.
+
+    Raises:
+        InputError: it is not above 0, or too fine.
+        InputTypeError: it is not a number.
+    """
     if isinstance(resolution, bool) or not isinstance(resolution, int | float):
         raise InputTypeError(rejection("resolution", resolution, "a number of metres > 0"))
     # One table per slot, and about ten more for positions, rewards and intermediate results.

@@ -1,0 +1,59 @@
+"""Compare algorithms on the same scenarios, schemes, horizons and seeds, beside the optimum.
+
+python recipes/compare.py
+python recipes/compare.py algorithm=[ddpg,td3] scenario=two_clusters learners=5
+python recipes/compare.py scenario=[] layouts=50 learners=1
+python recipes/compare.py output=runs/NAME
+"""
+
+import sys
+from functools import partial
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+from hyuav.comparison.charts import draw
+from hyuav.comparison.directory import ComparisonDirectory
+from hyuav.comparison.plan import Compare, require_libraries
+from hyuav.comparison.tables import print_tables
+from hyuav.comparison.work import work_off
+from hyuav.configuration import Config, recipe, section
+from hyuav.evaluation import EvaluationParameters
+from hyuav.learning.training import TrainingParameters
+from hyuav.tracking import LoggerParameters
+
+
+@recipe(
+    "compare",
+    Compare,
+    groups={},
+    sections={
+        "training": partial(TrainingParameters, num_episodes=600),
+        "evaluation": EvaluationParameters,
+        "logger": partial(LoggerParameters, mode="disabled"),
+    },
+    run_directory="${output}",
+)
+def main(config: Config, directory: Path) -> None:
+    """Train what is missing, print the tables, draw the figures."""
+    options = section(config, Compare)
+    require_libraries(options.algorithm)
+    torch.set_num_threads(1)
+    comparison = ComparisonDirectory(directory, config, options)
+    console = Console()
+    failures = work_off(comparison, console)
+    summary = comparison.summary()
+    if summary is not None:
+        summary.save(directory)
+        print_tables(summary, options.threshold, console)
+        draw(summary, options, directory / "figures")
+    console.print(f"comparison: {directory}", soft_wrap=True)
+    for name, reason in failures.items():
+        print(f"failed: {name}: {reason}", file=sys.stderr)
+    if failures:
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Several algorithms on the same scenarios, schemes, horizons and seeds, beside the optimum."""

@@ -1,0 +1,192 @@
+"""A comparison's figures: cells, learning curves, performance profiles, improvements."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from hyuav.comparison.directory import Summary
+from hyuav.comparison.plan import ENTRIES, PEER, Compare
+from hyuav.comparison.statistics import learning_curves, performance_profiles
+from hyuav.comparison.tables import label
+from hyuav.envs.rendering import OKABE_ITO
+from hyuav.figures import COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
+
+_OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
+
+COLORS = {name: OKABE_ITO[_OTHERS[i % len(_OTHERS)]] for i, name in enumerate(ENTRIES)} | {
+    PEER: OKABE_ITO["vermillion"]
+}
+"""The same color for an algorithm in every figure."""
+
+FRACTION = "Fraction of the optimum"
+
+
+def draw(summary: Summary, options: Compare, directory: Path) -> None:
+    """Write the figures as PNG and PDF.
+
+    Args:
+        summary: of the comparison.
+        options: with the threshold.
+        directory: for the files.
+    """
+    results, threshold = summary.results, options.threshold
+    save_figure(cell_means(summary.cells), directory, "cells")
+    curves = learning_curves(summary.curves)
+    save_figure(curves_figure(curves, threshold), directory, "learning_curves")
+    lowest = max(math.floor(20 * results["fraction"].min()) / 20, 0.0)
+    profiles = performance_profiles(results, np.linspace(min(lowest, 0.95), 1.0, 101))
+    save_figure(profiles_figure(profiles, threshold), directory, "performance_profiles")
+    if len(summary.improvements):
+        save_figure(improvement_bars(summary.improvements), directory, "improvement")
+
+
+def cell_means(cells: pd.DataFrame) -> Figure:
+    """Each cell's interquartile mean with its interval, and its worst learner as a tick.
+
+    Args:
+        cells: as :func:`hyuav.comparison.statistics.summarize_cells` gives them.
+    """
+    groups = list(cells.groupby(["scenario", "num_slots"], sort=False))
+    algorithms, schemes = (list(dict.fromkeys(cells[name])) for name in ("algorithm", "scheme"))
+    columns = min(len(groups), 2)
+    rows = math.ceil(len(groups) / columns)
+    height = 0.35 + 0.13 * len(schemes) * (len(algorithms) + 1)
+    with mpl.rc_context(STYLE):
+        figure = Figure(
+            figsize=(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, rows * height + 0.75),
+            layout="constrained",
+        )
+        panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flatten()
+        for axes, ((scenario, num_slots), group) in zip(panels, groups, strict=False):
+            _draw_cells(axes, group, algorithms, schemes)
+            axes.set_title(f"{scenario}, T = {num_slots}", fontsize=8)
+        for axes in panels[len(groups) :]:
+            axes.set_visible(False)
+        for axes in panels[max(len(groups) - columns, 0) : len(groups)]:
+            axes.set_xlabel(f"{FRACTION} (IQM, 95 % interval)")
+            axes.tick_params(labelbottom=True)
+        worst = Line2D([], [], color="0.3", marker="|", linestyle="", label="worst learner")
+        handles = [_handle(name) for name in algorithms]
+        figure.legend(
+            handles=[*handles, worst],
+            loc="outside lower center",
+            ncols=7 if columns > 1 else 3,
+            frameon=False,
+            columnspacing=1.2,
+        )
+        return figure
+
+
+def _draw_cells(
+    axes: Axes, cells: pd.DataFrame, algorithms: Sequence[str], schemes: Sequence[str]
+) -> None:
+    step = 1.0 / (len(algorithms) + 1)
+    for _, cell in cells.iterrows():
+        name = cell["algorithm"]
+        offset = (algorithms.index(name) - (len(algorithms) - 1) / 2) * step
+        y = schemes.index(cell["scheme"]) + offset
+        axes.plot([cell["low"], cell["high"]], [y, y], color=COLORS[name], linewidth=1.4)
+        axes.plot(cell["iqm"], y, "o", color=COLORS[name])
+        axes.plot(cell["worst"], y, "|", color=COLORS[name], markersize=6.0)
+    axes.set_yticks(range(len(schemes)), schemes)
+    axes.set_ylim(len(schemes) - 0.5, -0.5)
+    axes.xaxis.set_major_formatter(_percent)
+    axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    for boundary in range(1, len(schemes)):
+        axes.axhline(boundary - 0.5, color="0.85", linewidth=0.5)
+    axes.grid(color="0.92", linewidth=0.5, axis="x")
+
+
+def _percent(value: float, _: float) -> str:
+    return f"{100 * value:g} %"
+
+
+def _handle(algorithm: str) -> Line2D:
+    return Line2D([], [], color=COLORS[algorithm], marker="o", label=label(algorithm))
+
+
+def curves_figure(curves: pd.DataFrame, threshold: float) -> Figure:
+    """What the best weights so far earn against the episodes, over all learners.
+
+    Args:
+        curves: as :func:`hyuav.comparison.statistics.learning_curves` gives them.
+        threshold: share of the optimum, drawn as a line.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
+        axes = figure.add_subplot()
+        _draw_bands(axes, curves, "episode", "iqm")
+        axes.axhline(threshold, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
+        axes.set(xlabel="Training episodes", ylabel=f"{FRACTION} (IQM)")
+        axes.yaxis.set_major_formatter(_percent)
+        axes.legend(loc="best", frameon=True, framealpha=0.9, edgecolor="0.8")
+        return figure
+
+
+def profiles_figure(profiles: pd.DataFrame, threshold: float) -> Figure:
+    """The share of learners that reach each fraction of the optimum.
+
+    Args:
+        profiles: as :func:`hyuav.comparison.statistics.performance_profiles` gives them.
+        threshold: share of the optimum, drawn as a line.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
+        axes = figure.add_subplot()
+        _draw_bands(axes, profiles, "fraction", "share")
+        axes.axvline(threshold, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
+        axes.set(xlabel=f"{FRACTION}, $\\tau$", ylabel="Learners that reach $\\tau$ or more")
+        axes.set_ylim(-0.02, 1.04)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(_percent)
+        axes.legend(loc="best", frameon=True, framealpha=0.9, edgecolor="0.8")
+        return figure
+
+
+def _draw_bands(axes: Axes, rows: pd.DataFrame, x: str, y: str) -> None:
+    for name, own in rows.groupby("algorithm", sort=False):
+        color = COLORS[str(name)]
+        axes.fill_between(own[x], own["low"], own["high"], color=color, alpha=0.2, linewidth=0)
+        axes.plot(own[x], own[y], color=color, linewidth=1.3, label=label(str(name)))
+    axes.margins(x=0.0)
+    axes.grid(color="0.92", linewidth=0.5)
+
+
+def improvement_bars(improvements: pd.DataFrame) -> Figure:
+    """For each pair, how probably a learner of the algorithm on the left is the better one.
+
+    Args:
+        improvements: as :func:`hyuav.comparison.statistics.improvements` gives them.
+    """
+    names = list(dict.fromkeys(improvements["algorithm"]))
+    order = improvements["algorithm"].map(names.index) < improvements["other"].map(names.index)
+    pairs = improvements[order]
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(COLUMN_WIDTH, 0.75 + 0.2 * len(pairs)), layout="constrained")
+        axes = figure.add_subplot()
+        places = range(len(pairs))
+        for place, (_, pair) in zip(places, pairs.iterrows(), strict=True):
+            color = COLORS[pair["algorithm"]]
+            axes.barh(place, pair["high"] - pair["low"], 0.6, pair["low"], color=color, alpha=0.35)
+            axes.plot(
+                [pair["probability"]] * 2, [place - 0.3, place + 0.3], color=color, linewidth=1.8
+            )
+        axes.axvline(0.5, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
+        axes.set_yticks(places, [label(name) for name in pairs["algorithm"]])
+        axes.set_ylim(len(pairs) - 0.4, -0.6)
+        axes.set_xlim(-0.02, 1.02)
+        axes.set_xlabel("Probability that left is better than right")
+        axes.xaxis.set_major_formatter(_percent)
+        axes.grid(color="0.92", linewidth=0.5, axis="x")
+        axes.set_axisbelow(True)
+        right = axes.secondary_yaxis("right")
+        right.set_yticks(places, [label(name) for name in pairs["other"]])
+        return figure

@@ -1,0 +1,180 @@
+"""A comparison's directory: what was asked for, what is done, and what came of it."""
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from omegaconf import OmegaConf
+
+from hyuav.comparison.optima import Optima
+from hyuav.comparison.plan import Compare, parameters_of, training_episodes
+from hyuav.comparison.shards import CURVES_FILE, RESULTS_FILE, Shard
+from hyuav.comparison.statistics import (
+    LAYOUTS,
+    improvements,
+    in_cells,
+    summarize_algorithms,
+    summarize_cells,
+)
+from hyuav.configuration import Config
+from hyuav.errors import InputError, rejection
+from hyuav.evaluation import EvaluationParameters
+from hyuav.learning.cohort import Learner
+from hyuav.learning.training import TrainingParameters
+from hyuav.parameters import read_yaml
+from hyuav.runs import RunConfiguration, require_writable
+from hyuav.schemes.optimum import require_resolution
+from hyuav.tracking import LoggerParameters
+
+WORKING = ("workers", "output", "logger", "training.cohorts")
+"""Entries of the configuration that change how the work is done and not what comes of it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Summary:
+    """What is told of the learners that have been trained."""
+
+    results: pd.DataFrame
+    """A row for each learner, as :func:`hyuav.comparison.shards.tables` gives them."""
+    curves: pd.DataFrame
+    """A row for each of its evaluations in training."""
+    cells: pd.DataFrame
+    algorithms: pd.DataFrame
+    layouts: pd.DataFrame
+    """As ``algorithms``, on the random layouts alone; empty where there are none."""
+    improvements: pd.DataFrame
+
+    def save(self, directory: Path) -> None:
+        """Write ``results``, ``curves`` and ``cells`` as Parquet, the rest as ``summary.json``."""
+        for name in ("results", "curves", "cells"):
+            getattr(self, name).to_parquet(directory / f"{name}.parquet")
+        content = {
+            name: getattr(self, name).to_dict(orient="records")
+            for name in ("algorithms", "layouts", "improvements")
+        }
+        text = json.dumps(content, indent=2)
+        (directory / "summary.json").write_text(f"{text}\n", encoding="utf-8")
+
+
+class ComparisonDirectory:
+    """The files of one comparison.
+
+    ``config.yaml``; ``optima/``, the best flights of each scenario; ``shards/``, the trainings;
+    ``results.parquet``, ``curves.parquet``, ``cells.parquet`` and ``summary.json``, what came of
+    them; and ``figures/``.
+
+    Args:
+        path: of the directory, which may hold part of the same comparison.
+        config: all that was asked for.
+        options: what is compared.
+
+    Raises:
+        InputError: an unacceptable parameter, another comparison in the directory, or a place
+            that cannot be written to.
+    """
+
+    def __init__(self, path: Path, config: Config, options: Compare) -> None:
+        self.path, self.options = path, options
+        self._training = TrainingParameters.from_dict(config["training"])
+        self._evaluation = EvaluationParameters.from_dict(config["evaluation"])
+        self._logger = LoggerParameters.from_dict(config["logger"])
+        training_episodes(self._training)
+        scenarios = options.scenarios()
+        for scenario in scenarios.values():
+            resolution, longest = self._evaluation.resolution, max(options.num_slots)
+            require_resolution(resolution, scenario.map_side, longest)
+        if options.workers > 1:
+            self._training = dataclasses.replace(self._training, cohorts=1)
+        self._begin(config)
+        self.optima = {
+            name: Optima(
+                scenario,
+                options.num_slots,
+                self._evaluation.resolution,
+                path / "optima" / f"{name}.parquet",
+            )
+            for name, scenario in scenarios.items()
+        }
+        self.shards = [
+            self._shard(algorithm, name, num_slots)
+            for algorithm in options.algorithm
+            for name in self.optima
+            for num_slots in options.num_slots
+        ]
+
+    def _begin(self, config: Config) -> None:
+        """Keep what was asked for, or find the same kept."""
+        hyperparameters = {name: parameters_of(name).to_dict() for name in self.options.algorithm}
+        request = {**config, "hyperparameters": hyperparameters}
+        file = self.path / "config.yaml"
+        require_writable("output", self.path)
+        if not file.exists():
+            file.write_text(OmegaConf.to_yaml(request), encoding="utf-8")
+            return
+        try:
+            asked, kept = _entries(request), _entries(read_yaml(file))
+        except InputError as error:
+            accepted = f"a comparison's directory (config.yaml: {error})"
+            raise InputError(rejection("output", str(self.path), accepted)) from None
+        for name in (*asked, *kept):
+            if asked.get(name) != kept.get(name):
+                accepted = (
+                    f"a comparison with {name} = {asked.get(name)} (there it is {kept.get(name)})"
+                )
+                raise InputError(rejection("output", str(self.path), accepted))
+
+    def _shard(self, algorithm: str, name: str, num_slots: int) -> Shard:
+        options = self.options
+        configuration = RunConfiguration(
+            name,
+            dataclasses.replace(self.optima[name].scenario, num_slots=num_slots),
+            tuple(
+                Learner(scheme, seed)
+                for scheme in options.scheme
+                for seed in range(options.seed, options.seed + options.learners)
+            ),
+            algorithm,
+            parameters_of(algorithm),
+            self._training,
+        )
+        return Shard(
+            configuration,
+            self._evaluation,
+            options.threshold,
+            self._logger,
+            self.optima[name],
+            self.path / "shards",
+        )
+
+    def summary(self) -> Summary | None:
+        """Of the shards that are finished; None where none is."""
+        finished = [shard.path for shard in self.shards if shard.is_finished]
+        if not finished:
+            return None
+        results, curves = (
+            pd.concat([pd.read_parquet(path / name) for path in finished], ignore_index=True)
+            for name in (RESULTS_FILE, CURVES_FILE)
+        )
+        threshold = self.options.threshold
+        on_layouts = results[in_cells(results)["scenario"] == LAYOUTS]
+        return Summary(
+            results,
+            curves,
+            summarize_cells(results, threshold),
+            summarize_algorithms(results, threshold),
+            summarize_algorithms(on_layouts, threshold),
+            improvements(results),
+        )
+
+
+def _entries(config: Config) -> dict[str, Any]:
+    """The entries on which results depend, by their dotted names."""
+    flat: dict[str, Any] = {}
+    for name, value in config.items():
+        if isinstance(value, dict):
+            flat |= {f"{name}.{key}": entry for key, entry in value.items()}
+        else:
+            flat[name] = value
+    return {name: value for name, value in flat.items() if not name.startswith(WORKING)}

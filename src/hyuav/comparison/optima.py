@@ -1,0 +1,57 @@
+"""The best flights of a scenario, solved once and kept in a file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from hyuav.evaluation import Policy
+from hyuav.scenario import Scenario
+from hyuav.schemes.optimum import FlightPolicy, solve_horizons
+
+
+@dataclass(frozen=True)
+class Optima:
+    """The best flight of each scheme over each horizon, in a Parquet file.
+
+    It has a row for each slot from 0: ``scheme``, ``num_slots``, ``value`` and
+    ``standard_error`` of the flight in bps/Hz, ``slot``, and ``x`` and ``y`` in m.
+    """
+
+    scenario: Scenario
+    """Whose ``num_slots`` is not used."""
+    horizons: tuple[int, ...]
+    resolution: float
+    """Of the grid in m."""
+    file: Path
+
+    def solve(self) -> None:
+        """Find the flights and write the file."""
+        found = solve_horizons(self.scenario, self.horizons, resolution=self.resolution)
+        flights = [
+            pd.DataFrame(
+                {
+                    "scheme": scheme,
+                    "num_slots": num_slots,
+                    "value": optimum.value,
+                    "standard_error": optimum.standard_error,
+                    "slot": range(num_slots + 1),
+                    "x": optimum.path[:, 0],
+                    "y": optimum.path[:, 1],
+                }
+            )
+            for scheme, optima in found.items()
+            for num_slots, optimum in optima.items()
+        ]
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        partial = self.file.with_suffix(".partial")
+        pd.concat(flights, ignore_index=True).to_parquet(partial)
+        partial.replace(self.file)
+
+    def policy(self, scheme: str, num_slots: int) -> Policy:
+        """The way to fly the best flight of a scheme over a horizon."""
+        flights = pd.read_parquet(self.file)
+        flight = flights[(flights["scheme"] == scheme) & (flights["num_slots"] == num_slots)]
+        path = torch.tensor(flight.sort_values("slot")[["x", "y"]].to_numpy())
+        return Policy(FlightPolicy(path, self.scenario))

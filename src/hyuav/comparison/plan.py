@@ -1,0 +1,102 @@
+"""What a comparison covers: algorithms, scenarios, schemes, horizons and seeds."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from hyuav.benchmark.plan import require_peers
+from hyuav.errors import InputError, rejection
+from hyuav.evaluation import EvaluationParameters
+from hyuav.layouts import random_layout
+from hyuav.learning.algorithms import ALGORITHMS, DDPG, AlgorithmParameters
+from hyuav.learning.training import TrainingParameters
+from hyuav.parameters import Parameters, choice, count, number, one_or_more, parameter, text
+from hyuav.recording import cores
+from hyuav.scenario import PRESETS, Scenario
+from hyuav.system import SCHEMES
+
+PEER = "stable_baselines3"
+"""Stable-Baselines3's DDPG, which learns from the Gymnasium environment."""
+
+ENTRIES = (*ALGORITHMS, PEER)
+"""What can be compared."""
+
+LAYOUT = "layout-"
+"""With its seed behind, the name of a random layout's scenario."""
+
+_presets = one_or_more(choice(*PRESETS), f"a list of {', '.join(PRESETS)}")
+
+
+def _any_presets(name: str, value: Any) -> Any:
+    return () if value in ([], ()) else _presets(name, value)
+
+
+@dataclass(frozen=True)
+class Compare(Parameters):
+    """What is compared, and how the work is divided."""
+
+    algorithm: tuple[str, ...] = parameter(
+        one_or_more(choice(*ENTRIES), "algorithms"), ("ddpg", "td3", "sac")
+    )
+    scenario: tuple[str, ...] = parameter(_any_presets, ("random_disk", "two_clusters"))
+    layouts: int = parameter(count(0), 0)
+    """Random layouts, besides the presets; see :func:`hyuav.layouts.random_layout`."""
+    layouts_seed: int = parameter(count(0), 1000)
+    """Of the first; the others follow."""
+    scheme: tuple[str, ...] = parameter(one_or_more(choice(*SCHEMES), "schemes"), tuple(SCHEMES))
+    num_slots: tuple[int, ...] = parameter(
+        one_or_more(count(), "numbers of slots"), (10, 20), symbol="T"
+    )
+    learners: int = parameter(count(), 10)
+    """Of each algorithm, scenario, scheme and horizon; their seeds follow ``seed``."""
+    seed: int = parameter(count(0), 0)
+    threshold: float = parameter(number(0.0, 1.0), 0.97)
+    """Share of the optimum that counts as solved."""
+    workers: int = parameter(count(), cores())
+    """Processes that train at the same time; with one, it is this process."""
+    output: str = parameter(text, "runs/${now:%Y-%m-%d_%H-%M-%S}_compare")
+    """Directory of the comparison, which may have been begun."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("algorithm", "scenario", "scheme", "num_slots"):
+            values = getattr(self, name)
+            if len(set(values)) < len(values):
+                raise InputError(rejection(name, list(values), "values that differ"))
+        if not self.scenario and not self.layouts:
+            accepted = "at least one preset, or layouts >= 1"
+            raise InputError(rejection("scenario", [], accepted))
+
+    def scenarios(self) -> dict[str, Scenario]:
+        """By name, the presets and then the random layouts."""
+        seeds = range(self.layouts_seed, self.layouts_seed + self.layouts)
+        drawn = {f"{LAYOUT}{seed}": Scenario(ue_positions=random_layout(seed)) for seed in seeds}
+        return {name: Scenario.preset(name) for name in self.scenario} | drawn
+
+
+def parameters_of(name: str) -> AlgorithmParameters:
+    """The hyperparameters with which an entry of :data:`ENTRIES` is compared."""
+    return DDPG() if name == PEER else ALGORITHMS[name]()
+
+
+def training_episodes(training: TrainingParameters) -> EvaluationParameters:
+    """The episodes through which a training's evaluations fly, for :func:`hyuav.evaluation.fly`.
+
+    Raises:
+        InputError: there is only one.
+    """
+    if training.evaluation_episodes < 2:
+        accepted = "a whole number >= 2"
+        raise InputError(rejection("evaluation_episodes", training.evaluation_episodes, accepted))
+    return EvaluationParameters(
+        episodes=training.evaluation_episodes, flights=1, seed=training.evaluation_seed
+    )
+
+
+def require_libraries(names: Iterable[str]) -> None:
+    """Accept entries whose libraries can be imported.
+
+    Raises:
+        InputError: naming those that cannot, and how to get them.
+    """
+    require_peers(("training",), tuple(name for name in names if name == PEER))

@@ -1,0 +1,153 @@
+"""A comparison's pieces of work, each kept in a directory of its own once it is done."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from rich.console import Console
+
+from hyuav.comparison.optima import Optima
+from hyuav.comparison.plan import PEER, training_episodes
+from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
+from hyuav.experiment import LEARNED, learned_policies, train
+from hyuav.runs import RunConfiguration
+from hyuav.tracking import LoggerParameters
+
+RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
+
+
+@dataclass(frozen=True)
+class Shard:
+    """All schemes and seeds of one algorithm, scenario and horizon, which train side by side.
+
+    Its directory is a run directory with two tables more, :func:`tables`; that of
+    Stable-Baselines3 holds the tables alone. It is there once all of it is written.
+    """
+
+    configuration: RunConfiguration
+    evaluation: EvaluationParameters
+    threshold: float
+    """Share of the optimum that counts as solved."""
+    logger: LoggerParameters
+    optima: Optima
+    parent: Path
+    """Of the shard's directory."""
+
+    @property
+    def name(self) -> str:
+        """Algorithm, scenario and horizon."""
+        configuration = self.configuration
+        horizon = configuration.scenario.num_slots
+        return f"{configuration.algorithm_name}_{configuration.scenario_name}_T{horizon}"
+
+    @property
+    def path(self) -> Path:
+        """Of the directory."""
+        return self.parent / self.name
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether nothing is left to do."""
+        return (self.path / RESULTS_FILE).is_file()
+
+    def run(self) -> None:
+        """Train, evaluate and keep everything; what a broken attempt left is removed."""
+        partial = self.path.with_name(f"{self.name}.partial")
+        if partial.exists():
+            shutil.rmtree(partial)
+        if self.configuration.algorithm_name == PEER:
+            from hyuav.comparison import stable_baselines  # needs a library that is optional
+
+            partial.mkdir(parents=True)
+            metrics, sum_rates = stable_baselines.train(self.configuration, self.evaluation)
+        else:
+            metrics, sum_rates = _train(self, partial)
+        results, curves = tables(self, metrics, sum_rates)
+        results.to_parquet(partial / RESULTS_FILE)
+        curves.to_parquet(partial / CURVES_FILE)
+        partial.rename(self.path)
+
+
+def _train(shard: Shard, directory: Path) -> tuple[pd.DataFrame, list[float]]:
+    """The evaluations of a training by this project, and the best actors' sum-rates in bps/Hz."""
+    configuration, scenario = shard.configuration, shard.configuration.scenario
+    run = train(directory, configuration, shard.logger, Console(quiet=True))
+    metrics = run.metrics().dropna(subset="evaluation")
+    metrics["seconds"] /= len(configuration.learners)
+    earned: dict[str, list[float]] = {
+        scheme: fly(scenario, scheme, policy, shard.evaluation)
+        .totals["secrecy_sum_rate"]
+        .mean(dim=1)
+        .tolist()
+        for scheme, (policy,) in learned_policies([run], scenario).items()
+    }
+    return metrics, [earned[LEARNED[own.scheme]].pop(0) for own in configuration.learners]
+
+
+def tables(
+    shard: Shard, metrics: pd.DataFrame, sum_rates: list[float]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """What the learners reached, and how.
+
+    Args:
+        shard: whose learners they are.
+        metrics: a row for each evaluation in training and learner: ``learner``, ``episode``,
+            ``slots``, ``evaluation`` and its ``sum_rate`` in bps/Hz, and ``seconds``, those that
+            passed since training began, with compiling and evaluating, divided by the learners
+            that trained side by side.
+        sum_rates: in bps/Hz, what each learner's best weights earn in the evaluation's episodes.
+
+    Returns:
+        ``results``, a row for each learner: ``sum_rate``, the ``optimum`` of its scheme in the
+        same episodes, and their ratio ``fraction``; ``episodes_to_threshold`` and
+        ``seconds_to_threshold`` at the first evaluation at which the best weights so far earned
+        the threshold's share of what the optimum earns in that evaluation's episodes, NaN where
+        none did; and ``seconds`` in all.
+        ``curves``, a row for each row of ``metrics``, with ``best_sum_rate``, what the best
+        weights so far earned, and its ``fraction`` of the optimum in the same episodes.
+    """
+    configuration, learners = shard.configuration, shard.configuration.learners
+    schemes = dict.fromkeys(own.scheme for own in learners)
+    evaluated = training_episodes(configuration.training)
+    in_training = {scheme: _optimum(shard, scheme, evaluated) for scheme in schemes}
+    in_evaluation = {scheme: _optimum(shard, scheme, shard.evaluation) for scheme in schemes}
+    results, curves = [], []
+    for index, (learner, sum_rate) in enumerate(zip(learners, sum_rates, strict=True)):
+        identity: dict[str, Any] = {
+            "algorithm": configuration.algorithm_name,
+            "scenario": configuration.scenario_name,
+            "scheme": learner.scheme,
+            "num_slots": configuration.scenario.num_slots,
+            "seed": learner.seed,
+        }
+        columns = ["episode", "slots", "seconds", "evaluation", "sum_rate"]
+        curve = metrics[metrics["learner"] == index][columns].reset_index(drop=True)
+        is_best = curve["evaluation"] > curve["evaluation"].cummax().shift(fill_value=-np.inf)
+        curve["best_sum_rate"] = curve["sum_rate"].where(is_best).ffill()
+        curve["fraction"] = curve["best_sum_rate"] / in_training[learner.scheme]
+        solved = curve[curve["fraction"] >= shard.threshold]
+        optimum = in_evaluation[learner.scheme]
+        results.append(
+            {
+                **identity,
+                "sum_rate": sum_rate,
+                "optimum": optimum,
+                "fraction": sum_rate / optimum,
+                "episodes_to_threshold": solved["episode"].iloc[0] if len(solved) else np.nan,
+                "seconds_to_threshold": solved["seconds"].iloc[0] if len(solved) else np.nan,
+                "seconds": curve["seconds"].iloc[-1],
+            }
+        )
+        curves.append(curve.assign(**identity)[[*identity, *curve.columns]])
+    return pd.DataFrame(results), pd.concat(curves, ignore_index=True)
+
+
+def _optimum(shard: Shard, scheme: str, episodes: EvaluationParameters) -> float:
+    """What the best flight earns in these episodes, in bps/Hz."""
+    scenario = shard.configuration.scenario
+    policy = shard.optima.policy(scheme, scenario.num_slots)
+    flights = fly(scenario, OPTIMA[scheme], policy, episodes)
+    return float(flights.totals["secrecy_sum_rate"].mean())

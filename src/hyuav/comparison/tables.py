@@ -1,0 +1,113 @@
+"""The tables that a comparison prints, each within 80 columns."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
+
+from hyuav.comparison.directory import Summary
+from hyuav.comparison.plan import PEER
+from hyuav.comparison.statistics import NEAR_OPTIMAL
+from hyuav.terminal import results_table
+
+
+def label(algorithm: str) -> str:
+    """An algorithm's name in tables and figures."""
+    if algorithm == PEER:
+        return "SB3 DDPG"
+    acronym, *rest = algorithm.split("_")
+    return " ".join([acronym.upper(), *rest])
+
+
+def print_tables(summary: Summary, threshold: float, console: Console) -> None:
+    """Print the cells of each scenario and horizon, then what is told of each algorithm.
+
+    Args:
+        summary: of the comparison.
+        threshold: share of the optimum that counts as solved.
+        console: to print on.
+    """
+    for (scenario, num_slots), cells in summary.cells.groupby(
+        ["scenario", "num_slots"], sort=False
+    ):
+        console.print(_cells(f"{scenario}, T = {num_slots}", cells, threshold))
+    console.print(_algorithms("All cells", summary.algorithms, threshold))
+    if len(summary.layouts) and summary.cells["scenario"].nunique() > 1:
+        console.print(_algorithms("Random layouts", summary.layouts, threshold))
+    if len(summary.improvements):
+        console.print(_improvements(summary.improvements))
+
+
+def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:
+    table = results_table(
+        f"{name}, % of the optimum: interquartile mean and\n"
+        f"95 % interval; medians until {_percent(threshold)} was reached first",
+        "Algorithm",
+        *("Scheme", "IQM", "worst", f">= {_percent(threshold)}", "episodes", "seconds"),
+    )
+    table.columns[1].justify = "left"
+    for scheme, own in cells.groupby("scheme", sort=False):
+        for _, cell in own.iterrows():
+            table.add_row(
+                label(cell["algorithm"]),
+                str(scheme),
+                _interval(cell),
+                f"{100 * cell['worst']:.1f}",
+                f"{100 * cell['above_threshold']:.0f} %",
+                _finite(cell["median_episodes_to_threshold"], "{:.0f}".format),
+                _finite(cell["median_seconds_to_threshold"], "{:.1f}".format),
+            )
+    return table
+
+
+def _algorithms(name: str, algorithms: pd.DataFrame, threshold: float) -> Table:
+    shares = (f">=\n{_percent(share)}" for share in (NEAR_OPTIMAL, threshold))
+    table = results_table(
+        f"{name}, % of the optimum: interquartile mean and 95 % interval",
+        "Algorithm",
+        *("lear-\nners", "IQM", "median", "worst", *shares, "seconds"),
+    )
+    for _, row in algorithms.iterrows():
+        table.add_row(
+            label(row["algorithm"]),
+            f"{row['learners']}",
+            _interval(row),
+            *(f"{100 * row[column]:.1f}" for column in ("median", "worst")),
+            *(f"{100 * row[column]:.0f} %" for column in ("near_optimal", "above_threshold")),
+            f"{row['seconds']:.1f}",
+        )
+    return table
+
+
+def _improvements(improvements: pd.DataFrame) -> Table:
+    names = list(dict.fromkeys(improvements["algorithm"]))
+    table = results_table("P(row better than column)", "Algorithm", *map(label, names))
+    table.caption = "* 50 % is outside the\n95 % interval"
+    table.caption_justify = "left"
+    pairs = improvements.set_index(["algorithm", "other"])
+    for name in names:
+        cells = []
+        for other in names:
+            if (name, other) not in pairs.index:
+                cells.append("-")
+                continue
+            pair = pairs.loc[(name, other)]
+            decided = " " if pair["low"] <= 0.5 <= pair["high"] else "*"
+            cells.append(f"{100 * pair['probability']:.0f} %{decided}")
+        table.add_row(label(name), *cells)
+    return table
+
+
+def _interval(row: "pd.Series[Any]") -> str:
+    return f"{100 * row['iqm']:.1f} [{100 * row['low']:.1f}, {100 * row['high']:.1f}]"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:g} %"
+
+
+def _finite(value: float, form: Callable[[float], str]) -> str:
+    return form(value) if math.isfinite(value) else "never"

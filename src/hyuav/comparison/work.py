@@ -1,0 +1,46 @@
+"""Doing what is left of a comparison, and telling how far it is."""
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from hyuav.comparison.directory import ComparisonDirectory
+from hyuav.comparison.optima import Optima
+from hyuav.comparison.processes import Workers
+from hyuav.comparison.shards import Shard
+
+
+def work_off(comparison: ComparisonDirectory, console: Console) -> dict[str, str]:
+    """Find the optima that are missing, then train the shards that are not finished.
+
+    Args:
+        comparison: to complete.
+        console: on which a terminal shows the progress.
+
+    Returns:
+        the reason for each failure, by what failed.
+    """
+    failures: dict[str, str] = {}
+    progress = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    )
+    with progress, Workers(comparison.options.workers) as workers:
+        unsolved = [own for own in comparison.optima.values() if not own.file.exists()]
+        task = progress.add_task("optima", total=len(unsolved))
+        for optima, reason in workers.attempt_all(Optima.solve, unsolved):
+            progress.advance(task)
+            if reason is not None:
+                failures[f"optima of {optima.file.stem}"] = reason
+        pending = [shard for shard in comparison.shards if not shard.is_finished]
+        solved = [shard for shard in pending if shard.optima.file.exists()]
+        finished = len(comparison.shards) - len(pending)
+        task = progress.add_task("shards", total=len(comparison.shards), completed=finished)
+        for shard, reason in workers.attempt_all(Shard.run, solved):
+            progress.advance(task)
+            if reason is not None:
+                failures[shard.name] = reason
+    return failures

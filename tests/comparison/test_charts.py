@@ -1,0 +1,80 @@
+"""The pictures of a comparison show what was compared, with one algorithm or with many."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from hyuav.comparison.charts import (
+    COLORS,
+    cell_means,
+    curves_figure,
+    improvement_bars,
+    profiles_figure,
+)
+from hyuav.comparison.plan import ENTRIES
+from hyuav.comparison.statistics import (
+    improvements,
+    learning_curves,
+    performance_profiles,
+    summarize_cells,
+)
+from hyuav.comparison.tables import label
+
+
+def learners(algorithms: tuple[str, ...]) -> pd.DataFrame:
+    rng = np.random.default_rng(0)
+    return pd.DataFrame(
+        [
+            {
+                "algorithm": algorithm,
+                "scenario": scenario,
+                "scheme": scheme,
+                "num_slots": 20,
+                "seed": seed,
+                "episode": episode,
+                "fraction": rng.uniform(0.8, 1.0),
+                "episodes_to_threshold": np.nan,
+                "seconds_to_threshold": np.nan,
+            }
+            for algorithm in algorithms
+            for scenario in ("random_disk", "two_clusters", "layout-7")
+            for scheme in ("hybrid", "relay")
+            for seed in range(3)
+            for episode in (10, 20)
+        ]
+    )
+
+
+def legend(figure: Figure) -> list[str]:
+    legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
+    return [text.get_text() for own in legends if own is not None for text in own.get_texts()]
+
+
+@pytest.mark.parametrize("algorithms", [("td3",), ENTRIES], ids=["one", "all"])
+def test_every_algorithm_is_named_in_its_color(algorithms: tuple[str, ...]) -> None:
+    rows = learners(algorithms)
+    last = rows[rows["episode"] == 20]
+    names = [label(algorithm) for algorithm in algorithms]
+    cells = cell_means(summarize_cells(last, 0.97))
+    assert legend(cells) == [*names, "worst learner"]
+    shown = [axes.get_title() for axes in cells.axes if axes.get_visible()]
+    assert shown == ["random_disk, T = 20", "two_clusters, T = 20", "layouts, T = 20"]
+    for figure in (
+        curves_figure(learning_curves(rows), 0.97),
+        profiles_figure(performance_profiles(last, np.linspace(0.8, 1.0, 5)), 0.97),
+    ):
+        assert legend(figure) == names
+        lines = {str(line.get_label()): line for line in figure.axes[0].lines}
+        colors = {name: to_hex(lines[label(name)].get_color()) for name in algorithms}
+        assert colors == {name: COLORS[name].lower() for name in algorithms}
+
+
+def test_no_two_algorithms_have_the_same_color() -> None:
+    assert len(set(COLORS.values())) == len(ENTRIES)
+
+
+def test_each_pair_is_shown_once() -> None:
+    figure = improvement_bars(improvements(learners(ENTRIES)))
+    assert len(figure.axes[0].get_yticks()) == len(ENTRIES) * (len(ENTRIES) - 1) / 2

@@ -1,0 +1,36 @@
+"""Pieces of work fail alone, whatever becomes of their process."""
+
+import os
+import signal
+
+from hyuav.comparison.processes import Workers
+from hyuav.errors import InputError
+
+
+def divide(number: int) -> None:
+    if number == 9:
+        raise InputError("number = 9: expected another")
+    if number == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+    1 / number
+
+
+REASONS = {
+    0: "ZeroDivisionError: division by zero",
+    1: None,
+    9: "number = 9: expected another",
+    2: None,
+}
+
+
+def test_pieces_that_fail_say_why() -> None:
+    with Workers(1) as workers:
+        assert dict(workers.attempt_all(divide, list(REASONS))) == REASONS
+        assert list(workers.attempt_all(divide, [])) == []
+
+
+def test_a_process_that_is_killed_takes_no_other_work_with_it() -> None:
+    reasons = {7: "its process was killed", **REASONS}
+    with Workers(2) as workers:
+        assert list(workers.attempt_all(divide, [])) == []
+        assert dict(workers.attempt_all(divide, list(reasons))) == reasons

@@ -1,0 +1,146 @@
+"""A shard's tables, in which every learner stands beside the optimum in the same episodes."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hyuav import Scenario
+from hyuav.comparison.optima import Optima
+from hyuav.comparison.plan import PEER, parameters_of, training_episodes
+from hyuav.comparison.shards import Shard, tables
+from hyuav.errors import InputError
+from hyuav.evaluation import EvaluationParameters, Policy, fly
+from hyuav.learning.cohort import Learner
+from hyuav.learning.training import Training, TrainingParameters
+from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.schemes.learned import LearnedPolicy
+from hyuav.schemes.optimum import solve
+from hyuav.tracking import LoggerParameters
+
+TRAINING = TrainingParameters(
+    num_episodes=5,
+    batch_size=8,
+    evaluation_every=2,
+    evaluation_episodes=6,
+    compile="never",
+    cohorts=1,
+)
+EVALUATION = EvaluationParameters(episodes=7, resolution=10.0)
+SCENARIO = Scenario(
+    ue_positions=((5.0, 6.0), (-7.0, 8.0)), helper_start=(-20.0, -20.0), num_slots=6
+)
+LEARNERS = tuple(Learner(scheme, seed) for scheme in ("relay", "hybrid") for seed in (3, 4))
+
+
+@pytest.fixture(scope="module")
+def optima(tmp_path_factory: pytest.TempPathFactory) -> Optima:
+    file = tmp_path_factory.mktemp("optima") / "campus.parquet"
+    optima = Optima(SCENARIO, (6, 8), EVALUATION.resolution, file)
+    optima.solve()
+    return optima
+
+
+def shard(optima: Optima, parent: Path, algorithm: str = "ddpg") -> Shard:
+    parameters = parameters_of(algorithm)
+    configuration = RunConfiguration("campus", SCENARIO, LEARNERS, algorithm, parameters, TRAINING)
+    logger = LoggerParameters(mode="disabled")
+    return Shard(configuration, EVALUATION, 0.5, logger, optima, parent)
+
+
+def test_the_optima_are_kept_as_they_were_found(optima: Optima) -> None:
+    found = solve(SCENARIO, resolution=EVALUATION.resolution)
+    for scheme, optimum in found.items():
+        path = optima.policy(scheme, 6).module.get_buffer("path")
+        assert np.array_equal(path, optimum.path)
+    assert len(optima.policy("relay", 8).module.get_buffer("path")) == 9
+    kept = pd.read_parquet(optima.file).query("num_slots == 6").groupby("scheme")["value"].first()
+    assert kept.to_dict() == {scheme: optimum.value for scheme, optimum in found.items()}
+
+
+def test_a_training_is_evaluated_in_the_episodes_that_its_optimum_flies() -> None:
+    training = Training(SCENARIO, [Learner("relay", 3)], parameters_of("ddpg"), TRAINING)
+    policy = LearnedPolicy(SCENARIO, parameters_of("ddpg"), training.best_weights)
+    totals = fly(SCENARIO, "re_ot", Policy(policy), training_episodes(TRAINING)).totals
+    penalty = SCENARIO.off_map_penalty * totals["off_map"]
+    flown = (totals["secrecy_sum_rate"] - penalty).mean()
+    assert training.evaluate().reward.item() == pytest.approx(float(flown), rel=1e-5)
+    sum_rate = totals["secrecy_sum_rate"].mean().item()
+    assert training.evaluate().sum_rate.item() == pytest.approx(sum_rate, rel=1e-5)
+
+
+def test_learners_are_set_beside_the_optimum(optima: Optima, tmp_path: Path) -> None:
+    work = shard(optima, tmp_path)
+    metrics = pd.DataFrame(
+        [
+            {
+                "learner": learner,
+                "episode": episode,
+                "slots": 6 * episode,
+                "seconds": 0.5 * episode,
+                "evaluation": {2: 1.0, 4: 3.0, 5: 2.0}[episode],
+                "sum_rate": {2: 0.0, 4: 1000.0, 5: 2000.0}[episode] * (learner == 1),
+            }
+            for episode in (2, 4, 5)
+            for learner in range(4)
+        ]
+    )
+    results, curves = tables(work, metrics, [1.0, 2.0, 3.0, 4.0])
+    assert results["scheme"].tolist() == ["relay", "relay", "hybrid", "hybrid"]
+    assert results["seed"].tolist() == [3, 4, 3, 4]
+    assert results["sum_rate"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    flights = fly(SCENARIO, "re_optimum", optima.policy("relay", 6), EVALUATION)
+    optimum = float(flights.totals["secrecy_sum_rate"].mean())
+    assert results["optimum"][0] == optimum
+    assert results["fraction"][1] == 2.0 / optimum
+    assert results["episodes_to_threshold"].tolist()[1] == 4
+    assert results["seconds_to_threshold"].tolist()[1] == 2.0
+    assert results["episodes_to_threshold"].isna().tolist() == [True, False, True, True]
+    assert results["seconds"].tolist() == [2.5] * 4
+    assert len(curves) == 12
+    solved = curves[curves["fraction"] > 0]
+    assert solved["best_sum_rate"].tolist() == [1000.0, 1000.0]  # the best by reward
+
+
+@pytest.mark.parametrize("algorithm", ["sac", PEER])
+def test_a_shard_trains_and_keeps_its_tables(
+    optima: Optima, tmp_path: Path, algorithm: str
+) -> None:
+    if algorithm == PEER:
+        pytest.importorskip(PEER)
+    work = shard(optima, tmp_path, algorithm)
+    work.run()
+    assert work.is_finished
+    assert [path.name for path in tmp_path.iterdir()] == [f"{algorithm}_campus_T6"]
+    results = pd.read_parquet(work.path / "results.parquet")
+    curves = pd.read_parquet(work.path / "curves.parquet")
+    assert list(zip(results["scheme"], results["seed"], strict=True)) == [
+        (learner.scheme, learner.seed) for learner in LEARNERS
+    ]
+    assert results["fraction"].between(0.0, 1.05).all()
+    assert results["sum_rate"].nunique() == 4
+    assert (results["seconds"] > 0).all()
+    for _, curve in curves.groupby(["scheme", "seed"]):
+        assert curve["episode"].tolist() == [2, 4, 5]
+        assert curve["slots"].tolist() == [12, 24, 30]
+        best = curve.loc[curve["evaluation"].idxmax(), "sum_rate"]
+        assert curve["best_sum_rate"].iloc[-1] == best
+        assert (curve["sum_rate"] >= curve["evaluation"] - 1e-5).all()
+
+
+def test_a_shard_of_this_project_is_a_run(optima: Optima, tmp_path: Path) -> None:
+    work = shard(optima, tmp_path)
+    work.run()
+    assert RunDirectory(work.path).configuration() == work.configuration
+    results = pd.read_parquet(work.path / "results.parquet")
+    weights = RunDirectory(work.path).best_weights()
+    last = LearnedPolicy(SCENARIO, work.configuration.algorithm, weights, 3)
+    flights = fly(SCENARIO, "proposed", Policy(last), EVALUATION)
+    expected = float(flights.totals["secrecy_sum_rate"].mean())
+    assert results["sum_rate"].iloc[3] == pytest.approx(expected, rel=1e-5)
+
+
+def test_an_evaluation_in_training_needs_two_episodes() -> None:
+    with pytest.raises(InputError, match=r"^evaluation_episodes = 1: expected a whole number >= 2"):
+        training_episodes(TrainingParameters(evaluation_episodes=1))

@@ -1,0 +1,189 @@
+"""The comparison's recipe as a user calls it, at a size that is small enough for a test."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hyuav.benchmark import plan
+from hyuav.runs import RunDirectory
+
+Call = Callable[..., None]
+Printed = pytest.CaptureFixture[str]
+
+TINY = [
+    "training.num_episodes=4",
+    "training.batch_size=8",
+    "training.evaluation_every=2",
+    "training.evaluation_episodes=3",
+    "training.compile=never",
+    "evaluation.episodes=4",
+    "evaluation.resolution=10",
+    "num_slots=8",
+    "learners=2",
+    "workers=1",
+    "output=here",
+]
+TWO = ["algorithm=[ddpg,sac]", "scenario=two_clusters", "scheme=[hybrid,relay]", *TINY]
+SHARDS = {"ddpg_two_clusters_T8", "sac_two_clusters_T8"}
+
+
+def test_a_comparison_trains_prints_keeps_and_draws(
+    call: Call, tmp_path: Path, capsys: Printed
+) -> None:
+    call("compare", *TWO)
+    here, printed = tmp_path / "here", capsys.readouterr().out
+    results = pd.read_parquet(here / "results.parquet")
+    identity = ["algorithm", "scenario", "scheme", "num_slots", "seed"]
+    assert results.columns[:5].tolist() == identity
+    assert len(results.drop_duplicates(identity)) == 2 * 2 * 2
+    np.testing.assert_allclose(results["fraction"], results["sum_rate"] / results["optimum"])
+    assert len(pd.read_parquet(here / "curves.parquet")) == 8 * 2
+    assert len(pd.read_parquet(here / "cells.parquet")) == 4
+    summary = json.loads((here / "summary.json").read_text())
+    assert [row["algorithm"] for row in summary["algorithms"]] == ["ddpg", "sac"]
+    assert len(summary["improvements"]) == 2
+    assert summary["layouts"] == []
+    assert {path.name for path in (here / "figures").iterdir()} == {
+        f"{name}.{kind}"
+        for name in ("cells", "learning_curves", "performance_profiles", "improvement")
+        for kind in ("png", "pdf")
+    }
+    assert {path.name for path in (here / "shards").iterdir()} == SHARDS
+    assert not list(here.rglob("wandb"))
+    table = [line for line in printed.splitlines() if not line.startswith("comparison:")]
+    assert max(map(len, table)) <= 80
+    assert "…" not in printed
+    call("evaluate", "run=here/shards/sac_two_clusters_T8", *TINY[5:7])
+    evaluation = json.loads((here / "shards/sac_two_clusters_T8/evaluation.json").read_text())
+    proposed = evaluation["schemes"]["proposed"]["secrecy_sum_rate"]["mean"]
+    own = results[(results["algorithm"] == "sac") & (results["scheme"] == "hybrid")]
+    assert proposed == pytest.approx(own["sum_rate"].mean(), rel=1e-5)
+
+
+def test_only_what_is_missing_is_done_again(call: Call, tmp_path: Path, capsys: Printed) -> None:
+    call("compare", *TWO)
+    here, shards = tmp_path / "here", tmp_path / "here" / "shards"
+    results = pd.read_parquet(here / "results.parquet").drop(columns="seconds")
+    kept = [*(shards / "ddpg_two_clusters_T8").rglob("*"), *(here / "optima").iterdir()]
+    written = [file.stat().st_mtime_ns for file in kept]
+    broken = shards / "sac_two_clusters_T8.partial"
+    (shards / "sac_two_clusters_T8").rename(broken)
+    (broken / "results.parquet").unlink()
+    capsys.readouterr()
+    call("compare", *TWO)
+    first = capsys.readouterr().out
+    assert {path.name for path in shards.iterdir()} == SHARDS
+    again = pd.read_parquet(here / "results.parquet").drop(columns="seconds")
+    pd.testing.assert_frame_equal(again, results)
+    kept += (shards / "sac_two_clusters_T8").rglob("*")
+    written += [file.stat().st_mtime_ns for file in kept[len(written) :]]
+    call("compare", *TWO, "training.cohorts=3", "workers=2")
+    assert capsys.readouterr().out == first
+    assert [file.stat().st_mtime_ns for file in kept] == written
+
+
+def test_a_shard_that_fails_is_named_and_tried_again(
+    call: Call, tmp_path: Path, capsys: Printed
+) -> None:
+    in_the_way = tmp_path / "here" / "shards" / "ddpg_two_clusters_T8.partial"
+    in_the_way.parent.mkdir(parents=True)
+    in_the_way.write_text("")
+    with pytest.raises(SystemExit) as stopped:
+        call("compare", *TWO)
+    assert stopped.value.code == 1
+    printed = capsys.readouterr()
+    (line,) = printed.err.splitlines()
+    assert line.startswith("failed: ddpg_two_clusters_T8: NotADirectoryError: ")
+    assert "SAC" in printed.out
+    results = pd.read_parquet(tmp_path / "here" / "results.parquet")
+    assert set(results["algorithm"]) == {"sac"}
+    in_the_way.unlink()
+    call("compare", *TWO)
+    results = pd.read_parquet(tmp_path / "here" / "results.parquet")
+    assert set(results["algorithm"]) == {"ddpg", "sac"}
+
+
+def test_shards_of_random_layouts_and_of_a_peer_train_in_processes(
+    call: Call, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("stable_baselines3")
+    entries = ["algorithm=[td3,stable_baselines3]", "scheme=jamming", "scenario=[]", "layouts=2"]
+    call("compare", *entries, *TINY, "learners=1", "workers=2")
+    here = tmp_path / "here"
+    layouts = [f"layout-{seed}" for seed in (1000, 1001)]
+    configurations = [
+        RunDirectory(here / "shards" / f"td3_{layout}_T8").configuration() for layout in layouts
+    ]
+    assert [own.scenario_name for own in configurations] == layouts
+    assert configurations[0].training.cohorts == 1
+    results = pd.read_parquet(here / "results.parquet")
+    assert results["scenario"].tolist() == layouts * 2
+    cells = pd.read_parquet(here / "cells.parquet")
+    assert cells["learners"].tolist() == [2, 2]
+    summary = json.loads((here / "summary.json").read_text())
+    assert [row["learners"] for row in summary["layouts"]] == [2, 2]
+    printed = capfd.readouterr()
+    assert "SB3 DDPG" in printed.out
+    assert "torchrl" not in printed.out + printed.err
+
+
+def test_a_directory_of_another_comparison_is_left_alone(
+    call: Call, tmp_path: Path, capsys: Printed
+) -> None:
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "config.yaml").write_text("threshold: 0.5\n")
+    with pytest.raises(SystemExit) as stopped:
+        call("compare", *TWO)
+    assert stopped.value.code == 2
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
+    assert "here': expected a comparison with algorithm = ['ddpg', 'sac']" in errors
+    assert [path.name for path in (tmp_path / "here").iterdir()] == ["config.yaml"]
+
+
+REFUSALS = [
+    (["algorithm=ppo"], "algorithm = 'ppo': expected one of ddpg, td3, sac"),
+    (["algorithm=[ddpg,dpg]"], "algorithm[1] = 'dpg': expected one of ddpg, td3, sac"),
+    (["algorithm=[sac,sac]"], "algorithm = ['sac', 'sac']: expected values that differ"),
+    (["scenario=square"], "scenario = 'square': expected one of random_disk, two_clusters"),
+    (["scenario=[]"], "scenario = []: expected at least one preset, or layouts >= 1"),
+    (["layouts=-1"], "layouts = -1: expected a whole number >= 0"),
+    (["scheme=both"], "scheme = 'both': expected one of hybrid, relay, jamming"),
+    (["num_slots=[10,0]"], "num_slots[1] = 0: expected a whole number >= 1"),
+    (["learners=0"], "learners = 0: expected a whole number >= 1"),
+    (["workers=0"], "workers = 0: expected a whole number >= 1"),
+    (["threshold=97"], "threshold = 97: expected a number in [0, 1]"),
+    (["treshold=1"], "configuration: unknown field 'treshold': did you mean 'threshold'"),
+    (["training.num_episodes=0"], "num_episodes = 0: expected a whole number >= 1"),
+    (["training.evaluation_episodes=1"], "evaluation_episodes = 1: expected a whole number >= 2"),
+    (["evaluation.resolution=1e-9"], "resolution = 1e-09: expected a number of metres"),
+    (["logger.mode=on"], "mode = 'on': expected one of offline, online, disabled"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "line"), REFUSALS, ids=[a[0] for a, _ in REFUSALS])
+def test_a_mistake_is_answered_by_one_line_and_status_2(
+    call: Call, tmp_path: Path, capsys: Printed, arguments: list[str], line: str
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        call("compare", *arguments)
+    errors = capsys.readouterr().err
+    assert stopped.value.code == 2
+    assert errors.count("\n") == 1
+    assert line in errors
+    assert not list(tmp_path.glob("runs/*"))
+
+
+def test_a_missing_library_is_named_with_the_way_to_get_it(
+    call: Call, monkeypatch: pytest.MonkeyPatch, capsys: Printed
+) -> None:
+    monkeypatch.setattr(plan, "_can_be_found", lambda _: False)
+    with pytest.raises(SystemExit) as stopped:
+        call("compare", "algorithm=[ddpg,stable_baselines3]", *TINY)
+    assert stopped.value.code == 2
+    line = "error: stable_baselines3 cannot be imported: pip install 'hyuav[bench]'\n"
+    assert capsys.readouterr().err == line
