@@ -146,10 +146,10 @@ def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[s
     horizons: set[int] = set()
     for run in runs:
         configuration, weights = run.configuration(), run.best_weights()
+        algorithm = configuration.algorithm
         if count_learners(weights) != len(configuration.learners):
             accepted = f"weights of {len(configuration.learners)} learners"
             raise InputError(rejection("checkpoint", str(run.best_checkpoint), accepted))
-        clock = configuration.training.clock
         by_scheme: dict[str, list[int]] = {}
         for index, learner in enumerate(configuration.learners):
             horizon = learner.num_slots or configuration.scenario.num_slots
@@ -157,8 +157,8 @@ def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[s
             if horizon == scenario.num_slots:
                 by_scheme.setdefault(LEARNED[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
-            module = LearnedPolicy(scenario, configuration.algorithm, weights, indices, clock=clock)
-            policies.setdefault(scheme, []).append(Policy(module, len(indices), clock))
+            module = LearnedPolicy(scenario, algorithm, weights, indices)
+            policies.setdefault(scheme, []).append(Policy(module, len(indices), algorithm.clock))
     if not policies:
         accepted = f"what learners were trained for, {', '.join(map(str, sorted(horizons)))}"
         raise InputError(rejection("num_slots", scenario.num_slots, accepted))

@@ -2,7 +2,7 @@ import pytest
 import torch
 from tensordict import TensorDict, TensorDictBase
 
-from hyuav.learning.exploration import GaussianNoise
+from hyuav.learning.exploration import GaussianNoise, WarmUp
 
 
 def slot(learners: int, step_count: int = 0) -> TensorDictBase:
@@ -46,3 +46,42 @@ def test_learners_are_disturbed_independently() -> None:
     draws = torch.stack([noise(slot(2))["action"] for _ in range(4000)])
     correlation = torch.corrcoef(draws.reshape(4000, 4).T)
     assert (correlation - torch.eye(4)).abs().max() < 0.06
+
+
+def test_noise_stays_above_its_floor() -> None:
+    torch.manual_seed(0)
+    noise = GaussianNoise(20_000, variance=0.6, decay=0.1, decay_per="slot", floor=0.05)
+    for _ in range(9):
+        action = noise(slot(20_000))["action"]
+    assert action.std().item() == pytest.approx(0.05, rel=0.03)
+
+
+def fly(warm_up: WarmUp, learners: int, num_slots: int) -> torch.Tensor:
+    """The actions (slots, N, 2) of one episode in which the actor wants to stay."""
+    return torch.stack([warm_up(slot(learners, count))["action"] for count in range(num_slots)])
+
+
+def test_a_warm_up_ends_after_its_episodes() -> None:
+    warm_up = WarmUp(3, episodes=2)
+    assert bool((fly(warm_up, 3, 5) != 0.0).all())
+    assert bool((fly(warm_up, 3, 5) != 0.0).all())
+    assert bool((fly(warm_up, 3, 5) == 0.0).all())
+
+
+def test_a_warm_up_sweeps_over_the_map() -> None:
+    torch.manual_seed(0)
+    actions = fly(WarmUp(5000, episodes=1), 5000, 20)
+    assert actions.abs().max() == 1.0
+    assert (actions.abs() == 1.0).float().mean().item() == pytest.approx(0.617, abs=0.02)  # |n|>.5
+    first, second = actions[:-1].flatten(), actions[1:].flatten()
+    assert torch.corrcoef(torch.stack([first, second]))[0, 1] > 0.8
+    distance = actions.sum(dim=0).abs()  # in slots at full speed along each axis
+    assert (distance > 7.0).float().mean() > 0.5
+
+
+def test_each_episode_of_a_warm_up_goes_its_own_way() -> None:
+    torch.manual_seed(0)
+    warm_up = WarmUp(5000, episodes=2)
+    last, first = fly(warm_up, 5000, 3)[-1], fly(warm_up, 5000, 1)[0]
+    correlation = torch.corrcoef(torch.stack([last.flatten(), first.flatten()]))[0, 1]
+    assert correlation.abs() < 0.05

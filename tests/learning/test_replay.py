@@ -3,7 +3,7 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import ReplayBuffer
 
-from hyuav.learning.replay import TRANSITION, as_transition, make_replay, sampled_slots
+from hyuav.learning.replay import RETURN, TRANSITION, Memory, make_replay, sampled_slots
 
 
 def transition(learners: int, slot: int) -> TensorDictBase:
@@ -37,7 +37,7 @@ def test_every_stored_slot_is_drawn_as_often_and_no_other(length: int) -> None:
 def test_each_learner_samples_only_its_own_transitions() -> None:
     replay = replay_of(3, 50, 200)
     for slot in range(30):
-        replay.extend(as_transition(transition(3, slot)).unsqueeze(0))
+        replay.extend(Memory().transition(transition(3, slot)).unsqueeze(0))
     rewards = replay.sample()["next", "reward"][..., 0]
     assert rewards.shape == (3, 200)
     assert torch.equal(rewards // 1000, torch.arange(3.0).unsqueeze(-1).expand(3, 200))
@@ -46,7 +46,7 @@ def test_each_learner_samples_only_its_own_transitions() -> None:
 def test_learners_sample_different_slots() -> None:
     replay = replay_of(2, 50, 200)
     for slot in range(50):
-        replay.extend(as_transition(transition(2, slot)).unsqueeze(0))
+        replay.extend(Memory().transition(transition(2, slot)).unsqueeze(0))
     slots = replay.sample()["next", "reward"][..., 0] % 1000
     assert not torch.equal(slots[0], slots[1])
 
@@ -54,11 +54,55 @@ def test_learners_sample_different_slots() -> None:
 def test_the_oldest_transitions_are_overwritten() -> None:
     replay = replay_of(1, 20, 500)
     for slot in range(35):
-        replay.extend(as_transition(transition(1, slot)).unsqueeze(0))
+        replay.extend(Memory().transition(transition(1, slot)).unsqueeze(0))
     sampled = set(replay.sample()["next", "reward"].flatten().tolist())
     assert sampled == set(map(float, range(15, 35)))
 
 
 def test_a_transition_holds_what_the_losses_read_and_nothing_else() -> None:
-    kept = as_transition(transition(1, 0))
+    kept = Memory().transition(transition(1, 0))
     assert set(kept.keys(include_nested=True, leaves_only=True)) == set(TRANSITION)
+
+
+def finish(memory: Memory, capacity: int, episodes: int, num_slots: int) -> ReplayBuffer:
+    """A replay after some episodes in which slot t of the first learner earns t."""
+    replay = replay_of(2, capacity, 4)
+    for _ in range(episodes):
+        for slot in range(num_slots):
+            replay.extend(memory.transition(transition(2, slot)).unsqueeze(0))
+        memory.finish_episode(replay, num_slots)
+    return replay
+
+
+def test_a_return_is_what_the_episode_brings_from_its_slot_on() -> None:
+    memory = Memory(discount=0.5, returns=True)
+    stored = finish(memory, 30, 2, 4)[:][RETURN][..., 0]
+    expected = [0.5 * 1 + 0.25 * 2 + 0.125 * 3, 1 + 0.5 * 2 + 0.25 * 3, 2 + 0.5 * 3, 3.0]
+    assert stored[:, 0].tolist() == expected * 2
+    assert stored[3::4, 1].tolist() == [1003.0, 1003.0]
+
+
+def test_returns_find_their_slots_where_the_replay_begins_anew() -> None:
+    stored = finish(Memory(returns=True), 10, 3, 4)[:]
+    rewards = stored["next", "reward"][..., 0]
+    expected = [[6.0, 6.0, 5.0, 3.0][int(slot)] for slot in rewards[:, 0]]
+    assert stored[RETURN][:, 0, 0].tolist() == expected
+
+
+def test_a_return_is_unknown_before_the_episode_ends() -> None:
+    memory = Memory(returns=True)
+    assert torch.equal(memory.transition(transition(2, 1))[RETURN], torch.full((2, 1), -torch.inf))
+
+
+def test_where_the_horizon_is_finite_an_episode_ends_the_return() -> None:
+    slot = transition(2, 1)
+    slot["next", "done"] = torch.tensor([[True], [False]])
+    kept = Memory(finite_horizon=True).transition(slot)
+    assert kept["next", "terminated"].tolist() == [[True], [False]]
+    assert not slot["next", "terminated"].any()  # what was collected is left as it is
+    assert not Memory().transition(slot)["next", "terminated"].any()
+
+
+def test_rewards_are_kept_in_the_scale_asked_for() -> None:
+    kept = Memory(reward_scale=0.1).transition(transition(2, 5))
+    torch.testing.assert_close(kept["next", "reward"], torch.tensor([[0.5], [100.5]]))

@@ -35,7 +35,6 @@ def cohort(name: str, scenario: Scenario = SCENARIO, batch_size: int = 8) -> Coh
         ALGORITHMS[name](hidden_sizes=(12, 8)),
         replay_size=30,
         batch_size=batch_size,
-        clock=False,
         device=None,
     )
 

@@ -12,9 +12,14 @@ from torchrl.collectors import Collector
 
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.replay import as_transition, make_replay
+from hyuav.learning.replay import make_replay
 from hyuav.learning.slots import CompiledSlots
-from hyuav.learning.weights import copy_weights, draw_weights, replace_learners
+from hyuav.learning.weights import (
+    copy_weights,
+    draw_weights,
+    replace_learners,
+    restore_actors,
+)
 from hyuav.parameters import Parameters, choice, count, optional, parameter
 from hyuav.randomness import RowStream, derived_seed, given_normals, standard_normal, uniform
 from hyuav.scenario import Scenario
@@ -54,7 +59,6 @@ class Cohort:
         algorithm: which one, with its hyperparameters.
         replay_size: transitions kept of each learner.
         batch_size: K.
-        clock: whether they observe the slots flown.
         device: of all tensors.
     """
 
@@ -65,15 +69,14 @@ class Cohort:
         algorithm: AlgorithmParameters,
         replay_size: int,
         batch_size: int,
-        *,
-        clock: bool,
         device: torch.device | str | None,
     ) -> None:
-        self.scenario, self.learners, self.clock = scenario, tuple(learners), clock
+        self.scenario, self.learners = scenario, tuple(learners)
+        self.clock = algorithm.clock
         self.batch_size = batch_size
         seeds = [learner.seed for learner in learners]
         schemes = [learner.scheme for learner in learners]
-        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, clock=clock)
+        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, clock=self.clock)
         observation_size = self.env.observation_spec["observation"].shape[-1]
         with self.env.device:
             self.algorithm = algorithm.build(len(seeds), observation_size)
@@ -100,7 +103,7 @@ class Cohort:
     def _random_streams(self, seeds: Sequence[int]) -> dict[str, RowStream]:
         size, normals = self.batch_size, sum(step.normals for step in self.algorithm.steps)
         laws = {
-            "exploration": (standard_normal, (2,)),
+            "exploration": (standard_normal, (self.algorithm.explorer_normals, 2)),
             "sampling": (uniform, (size,)),
             "losses": (standard_normal, (normals, size, 2)),
         }
@@ -111,7 +114,7 @@ class Cohort:
         }
 
     def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
-        with given_normals(self._streams["exploration"]):
+        with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
             return self.algorithm.explorer(tensordict)
 
     @property
@@ -146,8 +149,11 @@ class Cohort:
             the accumulated reward (N,) in bps/Hz, and each gradient step's mean loss (N,).
         """
         self.episode += 1
-        if self._compiled is None:
-            return self._fly_slots()
+        flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
+        self.algorithm.memory.finish_episode(self.replay, self.scenario.num_slots)
+        return flown
+
+    def _fly_compiled(self, compiled: CompiledSlots) -> tuple[Tensor, dict[str, Tensor]]:
         slots, draws = self.scenario.num_slots, self.env.base_env.draws
         blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
         if self.scenario.fading:
@@ -155,7 +161,7 @@ class Cohort:
         if self.env.base_env.system.edge_can_saturate:
             blocks["tasks"] = draws.take_tasks(slots).contiguous()
         carrier = self.collector._carrier
-        reward, losses = self._compiled.fly(carrier, blocks, self.updates)
+        reward, losses = compiled.fly(carrier, blocks, self.updates)
         self.updates += slots
         carrier.update(self.env.reset())
         return reward, losses
@@ -166,7 +172,7 @@ class Cohort:
         for _ in range(self.scenario.num_slots):
             transition = next(self._transitions)[:, 0]
             reward += transition["next", "reward"].squeeze(-1)
-            self.replay.extend(as_transition(transition).unsqueeze(0))
+            self.replay.extend(self.algorithm.memory.transition(transition).unsqueeze(0))
             if len(self.replay) >= self.batch_size:
                 losses.append(self._learn())
         return reward, _mean(losses)
@@ -209,10 +215,15 @@ class Cohort:
         return Earned(reward, reward + self.scenario.off_map_penalty * off_map)
 
     def keep_best(self, evaluation: Tensor) -> None:
-        """Where a learner was never better than ``evaluation`` (N,), its weights are the best."""
+        """Where a learner was never better than ``evaluation`` (N,), its weights are the best.
+
+        Where it was, and the algorithm restarts, its actor goes on from the best.
+        """
         better = evaluation > self.best_evaluation
         self.best_evaluation = torch.where(better, evaluation, self.best_evaluation)
         replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
+        if self.algorithm.restarts(self.episode):
+            restore_actors(self.algorithm.loss, self.best_weights, ~better)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that evolves; the tensors are the cohort's own."""

@@ -1,8 +1,11 @@
-"""The noise process that Algorithm 1 adds to the actor's action."""
+"""The noise that Algorithm 1 adds to the actor's action, and what may come before it."""
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+
+PERSISTENCE, SWEEP = 0.9, 2.0
+"""Correlation of a sweep's consecutive actions, and their size before they are clipped."""
 
 
 class GaussianNoise(TensorDictModuleBase):
@@ -16,14 +19,17 @@ class GaussianNoise(TensorDictModuleBase):
         variance: of the noise in the first slot, in units of v_max squared.
         decay: factor of the standard deviation.
         decay_per: "slot" or "episode".
+        floor: that the standard deviation does not fall below.
     """
 
     in_keys = ("action", "step_count")
     out_keys = ("action",)
 
-    def __init__(self, learners: int, variance: float, decay: float, decay_per: str) -> None:
+    def __init__(
+        self, learners: int, variance: float, decay: float, decay_per: str, floor: float = 0.0
+    ) -> None:
         super().__init__()
-        self.decay, self.decay_per = decay, decay_per
+        self.decay, self.decay_per, self.floor = decay, decay_per, floor
         self.register_buffer("std", torch.full((learners, 1), variance**0.5))
         self.register_buffer("fresh", torch.ones(learners, 1, dtype=torch.bool))
 
@@ -36,6 +42,39 @@ class GaussianNoise(TensorDictModuleBase):
         self.std.mul_(torch.where(finished, self.decay, 1.0))
         self.fresh.fill_(False)
         action = tensordict["action"]
-        noisy = action + self.std * torch.randn_like(action)
+        noisy = action + self.std.clamp(min=self.floor) * torch.randn_like(action)
         tensordict["action"] = noisy.clamp(-1.0, 1.0)
+        return tensordict
+
+
+class WarmUp(TensorDictModuleBase):
+    """Fly at random for some episodes, whatever ``action`` says, in long sweeps over the map.
+
+    An action is an autoregressive Gaussian process of unit variance, begun anew in each episode,
+    times :data:`SWEEP`, and clipped: mostly full speed ahead, in a direction that is kept for
+    some ten slots. Independent actions would only tremble about the start.
+
+    Args:
+        learners: N; each flies its own way.
+        episodes: to fly so.
+    """
+
+    in_keys = ("action", "step_count")
+    out_keys = ("action",)
+
+    def __init__(self, learners: int, episodes: int) -> None:
+        super().__init__()
+        self._episodes = episodes
+        self.register_buffer("heading", torch.zeros(learners, 2))
+        self.register_buffer("episode", torch.zeros(learners, 1))
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Read ``action`` (N, 2) and ``step_count`` (N, 1), write the ``action`` to take."""
+        action, begins = tensordict["action"], tensordict["step_count"] == 0
+        self.episode.add_(begins)
+        normal = torch.randn_like(action)
+        turned = PERSISTENCE * self.heading + (1.0 - PERSISTENCE**2) ** 0.5 * normal
+        self.heading.copy_(torch.where(begins, normal, turned))
+        sweep = (SWEEP * self.heading).clamp(-1.0, 1.0)
+        tensordict["action"] = torch.where(self.episode > self._episodes, action, sweep)
         return tensordict

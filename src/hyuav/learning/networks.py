@@ -45,6 +45,8 @@ class LearnerMLP(nn.Module):
         out_features: of the output.
         activation: of the hidden layers, a name of :data:`ACTIVATIONS`.
         output: applied to the last layer's result, if any.
+        layer_norm: bring each hidden layer's sums to zero mean and unit variance (Ba et al.,
+            2016), without weights of its own.
     """
 
     def __init__(
@@ -55,12 +57,17 @@ class LearnerMLP(nn.Module):
         out_features: int,
         activation: str,
         output: nn.Module | None = None,
+        *,
+        layer_norm: bool = False,
     ) -> None:
         super().__init__()
         sizes = [in_features, *hidden_sizes]
         layers: list[nn.Module] = []
         for before, after in itertools.pairwise(sizes):
-            layers += [LearnerLinear(learners, before, after), ACTIVATIONS[activation]()]
+            layers.append(LearnerLinear(learners, before, after))
+            if layer_norm:
+                layers.append(nn.LayerNorm(after, elementwise_affine=False))
+            layers.append(ACTIVATIONS[activation]())
         layers.append(LearnerLinear(learners, sizes[-1], out_features))
         if output is not None:
             layers.append(output)
@@ -78,7 +85,12 @@ class LearnerMLP(nn.Module):
 
 
 def make_critic(
-    learners: int, observation_size: int, hidden_sizes: Sequence[int], activation: str
+    learners: int,
+    observation_size: int,
+    hidden_sizes: Sequence[int],
+    activation: str,
+    *,
+    layer_norm: bool = False,
 ) -> TensorDictModule:
     """Q(s, a) of N learners.
 
@@ -86,7 +98,9 @@ def make_critic(
     ``state_action_value`` (N, ..., 1).
     """
     return TensorDictModule(
-        LearnerMLP(learners, observation_size + 2, hidden_sizes, 1, activation),
+        LearnerMLP(
+            learners, observation_size + 2, hidden_sizes, 1, activation, layer_norm=layer_norm
+        ),
         in_keys=["observation", "action"],
         out_keys=["state_action_value"],
     )

@@ -1,15 +1,16 @@
 """Replay along the learner axis: one buffer, in which each learner samples only its own past."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import NestedKey, TensorDictBase
 from torch import Tensor
 from torchrl.data import LazyTensorStorage, ReplayBuffer
 from torchrl.data.replay_buffers import RandomSampler, Storage
 
-TRANSITION = (
+TRANSITION: tuple[NestedKey, ...] = (
     "observation",
     "action",
     ("next", "observation"),
@@ -18,6 +19,8 @@ TRANSITION = (
     ("next", "terminated"),
 )
 """What a mini-batch consists of: (s_t, a_t, r_t, s_{t+1}) and whether the episode ended."""
+
+RETURN: NestedKey = ("next", "return")
 
 
 def sampled_slots(uniform: Tensor, length: int | Tensor) -> Tensor:
@@ -50,7 +53,7 @@ def make_replay(
 ) -> ReplayBuffer:
     """The buffer B of Algorithm 1 for N learners.
 
-    Add one slot of all learners, a tensordict (N,) with the entries of :data:`TRANSITION`;
+    Add one slot of all learners, a tensordict (N,) as :meth:`Memory.transition` makes it;
     a sample is (N, K).
 
     Args:
@@ -66,6 +69,42 @@ def make_replay(
     )
 
 
-def as_transition(slot: TensorDictBase) -> TensorDictBase:
-    """Keep of a collected slot (N,) what a mini-batch needs."""
-    return slot.select(*TRANSITION)
+@dataclass(frozen=True)
+class Memory:
+    """What a learner keeps of a slot: a transition, as it wants to see it."""
+
+    discount: float = 1.0
+    reward_scale: float = 1.0
+    """Factor of all rewards."""
+    finite_horizon: bool = False
+    """The last slot of an episode ends the return, which otherwise goes on past it."""
+    returns: bool = False
+    """Keep ``("next", "return")`` too: what the episode brought from this slot on."""
+
+    @property
+    def names(self) -> tuple[NestedKey, ...]:
+        """The entries of a transition."""
+        return (*TRANSITION, RETURN) if self.returns else TRANSITION
+
+    def transition(self, slot: TensorDictBase) -> TensorDictBase:
+        """What is kept of a collected slot (N,); its return is not known yet."""
+        kept = slot.select(*TRANSITION)
+        if self.reward_scale != 1.0:
+            kept["next", "reward"] = kept["next", "reward"] * self.reward_scale
+        if self.finite_horizon:
+            kept["next", "terminated"] = kept["next", "done"].clone()
+        if self.returns:
+            kept[RETURN] = torch.full_like(kept["next", "reward"], -torch.inf)
+        return kept
+
+    def finish_episode(self, replay: ReplayBuffer, num_slots: int) -> None:
+        """Fill in the returns of the episode whose slots were stored last."""
+        if not self.returns:
+            return
+        storage, capacity = replay.storage, replay.storage.max_size
+        reward, returned = storage._storage["next", "reward"], storage._storage[RETURN]
+        following = torch.zeros_like(reward[0])
+        for ago in range(min(num_slots, capacity)):
+            slot = (replay.writer._cursor - 1 - ago) % capacity
+            following = reward[slot] + self.discount * following
+            returned[slot] = following

@@ -18,7 +18,7 @@ from torchrl.envs import TransformedEnv
 
 from hyuav.envs.draws import GivenDraws
 from hyuav.learning.algorithms import Algorithm, GradientStep
-from hyuav.learning.replay import TRANSITION, as_transition, sampled_slots
+from hyuav.learning.replay import sampled_slots
 from hyuav.randomness import given_normals
 from hyuav.recording import compile_function
 from hyuav.system import Tasks
@@ -78,10 +78,11 @@ class CompiledSlots:
 
         Args:
             carrier: what the helpers observe before the first slot, (N,); left as it is.
-            draws: random numbers, a slot in each row: ``exploration`` (slots, N, 2), standard
-                normal; ``sampling`` (slots, N, K), uniform; ``losses`` (slots, N, n, K, 2),
-                standard normal, where the losses draw n times; ``fading`` (slots, N, 3 U + 2) and
-                ``tasks`` (slots, N, 2, U) where the environment needs them.
+            draws: random numbers, a slot in each row: ``exploration`` (slots, N, n, 2), standard
+                normal, where the explorer draws n times; ``sampling`` (slots, N, K), uniform;
+                ``losses`` (slots, N, n, K, 2), standard normal, where the losses draw n times;
+                ``fading`` (slots, N, 3 U + 2) and ``tasks`` (slots, N, 2, U) where the
+                environment needs them.
             updates: taken before.
 
         Returns:
@@ -133,7 +134,7 @@ class CompiledSlots:
         system, steps = self._env.base_env.system, self._algorithm.steps
         num_ues, normals = system.scenario.num_ues, sum(step.normals for step in steps)
         shapes: dict[str, tuple[int, ...]] = {
-            "exploration": (learners, 2),
+            "exploration": (learners, self._algorithm.explorer_normals, 2),
             "sampling": (learners, batch_size),
             "corrections": (len(steps), 2),
         }
@@ -150,7 +151,7 @@ class CompiledSlots:
         """What is recorded: one slot of all learners, with its update."""
         given = dict(zip(self._names, inputs, strict=True))
         flown = self._fly_slot(given)
-        self._store(as_transition(flown))
+        self._store(self._algorithm.memory.transition(flown))
         self._go_on(flown)
         normals = given["losses"].unbind(dim=1) if "losses" in given else ()
         with given_normals(iter(normals)):
@@ -162,7 +163,7 @@ class CompiledSlots:
         tasks = Tasks(*given["tasks"].unbind(dim=1)) if "tasks" in given else None
         env.base_env.draws = GivenDraws(given.get("fading"), tasks)
         try:
-            with given_normals(iter([given["exploration"]])):
+            with given_normals(iter(given["exploration"].unbind(dim=1))):
                 action = self._algorithm.explorer(self._carrier.clone(False))
             return env.step(action)
         finally:
@@ -175,7 +176,7 @@ class CompiledSlots:
             values.copy_(following[name])
 
     def _store(self, transition: TensorDictBase) -> None:
-        for name in TRANSITION:
+        for name in self._algorithm.memory.names:
             self._storage[name].index_copy_(0, self._cursor, transition[name].unsqueeze(0))
         capacity = self._replay.storage.max_size
         self._cursor.copy_((self._cursor + 1) % capacity)
@@ -184,7 +185,7 @@ class CompiledSlots:
     def _sample(self, uniform: Tensor) -> TensorDictBase:
         slots = sampled_slots(uniform, self._length)
         batch = TensorDict(batch_size=uniform.shape, device=self._env.device)
-        for name in TRANSITION:
+        for name in self._algorithm.memory.names:
             batch[name] = self._storage[name][slots, self._learners]
         return batch
 

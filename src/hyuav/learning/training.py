@@ -17,7 +17,7 @@ from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.cohort import Cohort, Earned, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
-from hyuav.parameters import Parameters, choice, count, parameter, switch
+from hyuav.parameters import Parameters, choice, count, parameter
 from hyuav.recording import COMPILATION_ERRORS, cores, has_compiler
 from hyuav.scenario import Scenario
 
@@ -41,7 +41,6 @@ class TrainingParameters(Parameters):
     evaluation_every: int = parameter(count(), 10, unit="episode")
     evaluation_episodes: int = parameter(count(), 100)
     evaluation_seed: int = parameter(count(0), 20_000)
-    clock: bool = parameter(switch, False)
     compile: str = parameter(choice("auto", "always", "never"), "auto")
     cohorts: int = parameter(count(), cores())
     """Groups of learners that are trained at the same time, each on a thread of its own."""
@@ -115,8 +114,7 @@ class Training:
                 algorithm,
                 parameters.replay_size,
                 parameters.batch_size,
-                clock=parameters.clock,
-                device=device,
+                device,
             )
             for members in self._members
         ]

@@ -21,7 +21,6 @@ class LearnedPolicy(TensorDictModuleBase):
         weights: of N learners, as a training saves them.
         learner: which of the N; or several, each of which flies one row of the batch's first
             dimension.
-        clock: whether the actor observes the slots flown.
 
     Raises:
         InputError: the weights do not fit the algorithm or the number of UEs.
@@ -36,13 +35,11 @@ class LearnedPolicy(TensorDictModuleBase):
         algorithm: AlgorithmParameters,
         weights: dict[str, Tensor],
         learner: int | Sequence[int] = 0,
-        *,
-        clock: bool = False,
     ) -> None:
         super().__init__()
         self._several = not isinstance(learner, int)
         learners = [learner] if isinstance(learner, int) else learner
-        built = algorithm.build(len(learners), scenario.num_ues + 5 + clock)
+        built = algorithm.build(len(learners), scenario.num_ues + 5 + algorithm.clock)
         load_weights(built.loss, join_learners([select_learner(weights, i) for i in learners]))
         self.actor = built.actor
 

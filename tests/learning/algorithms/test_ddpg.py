@@ -87,4 +87,13 @@ def test_the_defaults_are_the_papers() -> None:
         "noise_variance": 0.6,
         "noise_decay": 0.999,
         "noise_decay_per": "slot",
+        # What the paper does not have:
+        "clock": False,
+        "finite_horizon": False,
+        "reward_scale": 1.0,
+        "layer_norm": False,
+        "warm_up_episodes": 0,
+        "restart_after": 0,
+        "return_bound": 0.0,
+        "noise_floor": 0.0,
     }

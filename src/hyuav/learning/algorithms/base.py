@@ -7,12 +7,15 @@ from dataclasses import dataclass
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase, TensorDictParams
+from tensordict.nn import TensorDictModuleBase, TensorDictParams, TensorDictSequential
 from torch import Tensor, nn
-from torchrl.objectives import LossModule, SoftUpdate
+from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 
+from hyuav.learning.exploration import WarmUp
 from hyuav.learning.networks import ACTIVATIONS
-from hyuav.parameters import Parameters, choice, count, number, parameter, sequence
+from hyuav.learning.replay import Memory
+from hyuav.learning.targets import BoundedTD0
+from hyuav.parameters import Parameters, choice, count, number, parameter, sequence, switch
 
 learning_rate = number(0.0, 1.0)
 
@@ -29,6 +32,20 @@ class AlgorithmParameters(Parameters, ABC):
     critic_learning_rate: float = parameter(learning_rate, 1e-4)
     discount: float = parameter(number(0.0, 1.0), 0.95, symbol="gamma")
     target_rate: float = parameter(number(0.0, 1.0), 0.005, symbol="tau")
+    clock: bool = parameter(switch, False)
+    """Observe the slots flown."""
+    finite_horizon: bool = parameter(switch, False)
+    """The last slot ends the return: no value is expected beyond it."""
+    reward_scale: float = parameter(number(above=0.0), 1.0)
+    layer_norm: bool = parameter(switch, False)
+    """In the critics."""
+    warm_up_episodes: int = parameter(count(0), 0)
+    """Flown at random; see :class:`hyuav.learning.exploration.WarmUp`."""
+    restart_after: int = parameter(count(0), 0)
+    """Episodes from which on an actor that is evaluated and found worse than it was goes on from
+    its best weights; 0 for never."""
+    return_bound: float = parameter(number(0.0, 1.0), 0.0)
+    """Trust in returns above the target; see :class:`hyuav.learning.targets.BoundedTD0`."""
 
     @abstractmethod
     def build(self, learners: int, observation_size: int) -> "Algorithm":
@@ -38,6 +55,35 @@ class AlgorithmParameters(Parameters, ABC):
             learners: N.
             observation_size: U + 5, or U + 6 with a clock.
         """
+
+    @property
+    def memory(self) -> Memory:
+        """What is kept of each slot."""
+        return Memory(
+            self.discount, self.reward_scale, self.finite_horizon, returns=self.return_bound > 0
+        )
+
+    def estimate_values(self, loss: LossModule) -> None:
+        """Give a loss its target."""
+        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
+        if self.return_bound:
+            plain = loss.value_estimator
+            bounded = BoundedTD0(
+                bound=self.return_bound, gamma=self.discount, value_network=plain.value_network
+            )
+            bounded.set_keys(value=plain.tensor_keys.value)
+            loss.make_value_estimator(bounded)
+
+    def warmed_up(self, explorer: TensorDictModuleBase, learners: int) -> TensorDictModuleBase:
+        """What acts in training: the explorer, after the warm-up where there is one."""
+        if not self.warm_up_episodes:
+            return explorer
+        return TensorDictSequential(explorer, WarmUp(learners, self.warm_up_episodes))
+
+    @property
+    def explorer_normals(self) -> int:
+        """Standard normal tensors (N, 2) that the explorer draws for each slot."""
+        return 1 + (self.warm_up_episodes > 0)
 
 
 @dataclass(frozen=True)
@@ -70,6 +116,15 @@ class Algorithm:
     """theta' <- tau theta + (1 - tau) theta'."""
     target_every: int = 1
     """The targets follow in every n-th update."""
+    memory: Memory = Memory()
+    explorer_normals: int = 1
+    """Standard normal tensors (N, 2) that the explorer draws for each slot."""
+    restart_after: int = 0
+    """Episodes from which on actors go back to their best weights; 0 for never."""
+
+    def restarts(self, episode: int) -> bool:
+        """Whether actors go back to their best weights after this episode's evaluation."""
+        return 0 < self.restart_after <= episode
 
     def due(self, index: int) -> tuple[bool, ...]:
         """Which gradient steps the update of this index takes, and last whether targets follow."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from tensordict.nn import TensorDictSequential
-from torchrl.objectives import DDPGLoss, SoftUpdate, ValueEstimators
+from torchrl.objectives import DDPGLoss, SoftUpdate
 
 from hyuav.learning.algorithms.base import Algorithm, AlgorithmParameters, GradientStep, adam
 from hyuav.learning.exploration import GaussianNoise
@@ -18,11 +18,13 @@ class DDPG(AlgorithmParameters):
     noise_variance: float = parameter(number(0.0, 1e6), 0.6)
     noise_decay: float = parameter(number(0.0, 1.0), 0.999)
     noise_decay_per: str = parameter(choice("slot", "episode"), "slot")
+    noise_floor: float = parameter(number(0.0, 1.0), 0.0)
+    """Of the standard deviation."""
 
     def build(self, learners: int, observation_size: int) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
         sizes = (learners, observation_size, self.hidden_sizes, self.activation)
-        actor, critic = make_actor(*sizes), make_critic(*sizes)
+        actor, critic = make_actor(*sizes), make_critic(*sizes, layer_norm=self.layer_norm)
         loss = DDPGLoss(
             actor,
             critic,
@@ -31,17 +33,29 @@ class DDPG(AlgorithmParameters):
             delay_value=True,
             reduction="none",
         )
-        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
-        noise = GaussianNoise(learners, self.noise_variance, self.noise_decay, self.noise_decay_per)
+        self.estimate_values(loss)
         critic_optimizer = adam(loss.value_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
             actor=actor,
-            explorer=TensorDictSequential(actor, noise),
+            explorer=self.warmed_up(TensorDictSequential(actor, self.noise(learners)), learners),
             loss=loss,
             steps=(
                 GradientStep("critic", lambda batch: loss.loss_value(batch)[0], critic_optimizer),
                 GradientStep("actor", lambda batch: loss.loss_actor(batch)[0], actor_optimizer),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
+            memory=self.memory,
+            explorer_normals=self.explorer_normals,
+            restart_after=self.restart_after,
+        )
+
+    def noise(self, learners: int) -> GaussianNoise:
+        """What is added to the actions of N learners."""
+        return GaussianNoise(
+            learners,
+            self.noise_variance,
+            self.noise_decay,
+            self.noise_decay_per,
+            self.noise_floor,
         )

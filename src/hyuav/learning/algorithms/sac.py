@@ -10,7 +10,7 @@ from tensordict.nn import NormalParamExtractor, TensorDictModule, TensorDictSequ
 from torch import Tensor, nn
 from torchrl.envs.utils import ExplorationType
 from torchrl.modules import ProbabilisticActor, TanhNormal
-from torchrl.objectives import SACLoss, SoftUpdate, ValueEstimators
+from torchrl.objectives import SACLoss, SoftUpdate
 from torchrl.objectives.sac import compute_rsample_log_prob
 
 from hyuav.learning.algorithms.base import (
@@ -81,7 +81,13 @@ class SAC(AlgorithmParameters):
         )
         loss = LearnerSACLoss(
             explorer,
-            make_critic(learners, observation_size, self.hidden_sizes, self.activation),
+            make_critic(
+                learners,
+                observation_size,
+                self.hidden_sizes,
+                self.activation,
+                layer_norm=self.layer_norm,
+            ),
             learners=learners,
             alpha_init=self.temperature_init,
             num_qvalue_nets=2,
@@ -90,7 +96,7 @@ class SAC(AlgorithmParameters):
             reduction="none",
             scalar_output_mode="exclude",
         )
-        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
+        self.estimate_values(loss)
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         actor_optimizer.add_param_group(
@@ -99,7 +105,7 @@ class SAC(AlgorithmParameters):
         mean = TensorDictModule(nn.Tanh(), in_keys=["loc"], out_keys=["action"])
         return Algorithm(
             actor=TensorDictSequential(distribution, mean),
-            explorer=explorer,
+            explorer=self.warmed_up(explorer, learners),
             loss=loss,
             steps=(
                 GradientStep(
@@ -111,4 +117,7 @@ class SAC(AlgorithmParameters):
                 GradientStep("actor", loss.actor_and_temperature_loss, actor_optimizer, normals=1),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
+            memory=self.memory,
+            explorer_normals=self.explorer_normals,
+            restart_after=self.restart_after,
         )

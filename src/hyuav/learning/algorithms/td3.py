@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 from tensordict.nn import TensorDictSequential
-from torchrl.objectives import SoftUpdate, TD3Loss, ValueEstimators
+from torchrl.objectives import SoftUpdate, TD3Loss
 
 from hyuav.learning.algorithms.base import Algorithm, GradientStep, adam
 from hyuav.learning.algorithms.ddpg import DDPG
-from hyuav.learning.exploration import GaussianNoise
 from hyuav.learning.networks import make_actor, make_critic
 from hyuav.parameters import count, number, parameter
 
@@ -23,7 +22,7 @@ class TD3(DDPG):
     def build(self, learners: int, observation_size: int) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
         sizes = (learners, observation_size, self.hidden_sizes, self.activation)
-        actor, critic = make_actor(*sizes), make_critic(*sizes)
+        actor, critic = make_actor(*sizes), make_critic(*sizes, layer_norm=self.layer_norm)
         loss = TD3Loss(
             actor,
             critic,
@@ -34,13 +33,12 @@ class TD3(DDPG):
             loss_function="l2",
             reduction="none",
         )
-        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
-        noise = GaussianNoise(learners, self.noise_variance, self.noise_decay, self.noise_decay_per)
+        self.estimate_values(loss)
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
             actor=actor,
-            explorer=TensorDictSequential(actor, noise),
+            explorer=self.warmed_up(TensorDictSequential(actor, self.noise(learners)), learners),
             loss=loss,
             steps=(
                 GradientStep(
@@ -58,4 +56,7 @@ class TD3(DDPG):
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
             target_every=self.actor_every,
+            memory=self.memory,
+            explorer_normals=self.explorer_normals,
+            restart_after=self.restart_after,
         )
