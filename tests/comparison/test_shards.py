@@ -46,7 +46,7 @@ def shard(optima: Optima, parent: Path, algorithm: str = "ddpg") -> Shard:
     parameters = parameters_of(algorithm)
     configuration = RunConfiguration("campus", SCENARIO, LEARNERS, algorithm, parameters, TRAINING)
     logger = LoggerParameters(mode="disabled")
-    return Shard(configuration, EVALUATION, 0.5, logger, optima, parent)
+    return Shard(algorithm, configuration, EVALUATION, 0.5, logger, optima, parent)
 
 
 def test_the_optima_are_kept_as_they_were_found(optima: Optima) -> None:
@@ -124,7 +124,7 @@ def test_a_shard_trains_and_keeps_its_tables(
     for _, curve in curves.groupby(["scheme", "seed"]):
         assert curve["episode"].tolist() == [2, 4, 5]
         assert curve["slots"].tolist() == [12, 24, 30]
-        best = curve.loc[curve["evaluation"].idxmax(), "sum_rate"]
+        best = curve["sum_rate"].to_numpy()[curve["evaluation"].argmax()]
         assert curve["best_sum_rate"].iloc[-1] == best
         assert (curve["sum_rate"] >= curve["evaluation"] - 1e-5).all()
 

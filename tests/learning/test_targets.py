@@ -1,5 +1,7 @@
 """The target that returns bound, in each of the losses."""
 
+from typing import Any
+
 import pytest
 import torch
 from tensordict import TensorDictBase
@@ -20,11 +22,14 @@ def built(name: str, bound: float) -> Algorithm:
 def target(name: str, bound: float, batch: TensorDictBase) -> torch.Tensor:
     """What the critic is to predict of each transition (2, K): where its loss is least."""
     algorithm = built(name, bound)
-    targets = []
+    targets: list[torch.Tensor] = []
     estimate = algorithm.loss.value_estimator.value_estimate
-    algorithm.loss.value_estimator.value_estimate = lambda *inputs, **options: (
-        targets.append(estimate(*inputs, **options)) or targets[-1]
-    )
+
+    def record(*inputs: Any, **options: Any) -> torch.Tensor:
+        targets.append(estimate(*inputs, **options))
+        return targets[-1]
+
+    algorithm.loss.value_estimator.value_estimate = record
     with given_normals(iter([torch.zeros(2, batch.shape[1], 2)] * 4)):
         algorithm.steps[0].loss(batch.clone())
     return targets[0].squeeze(-1)

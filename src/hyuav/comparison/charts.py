@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from hyuav.comparison.directory import Summary
-from hyuav.comparison.plan import ENTRIES, PEER, Compare
+from hyuav.comparison.plan import ENTRIES, PEER, PIECES, Compare
 from hyuav.comparison.statistics import learning_curves, performance_profiles
 from hyuav.comparison.tables import label
 from hyuav.envs.rendering import OKABE_ITO
@@ -25,6 +25,13 @@ COLORS = {name: OKABE_ITO[_OTHERS[i % len(_OTHERS)]] for i, name in enumerate(EN
     PEER: OKABE_ITO["vermillion"]
 }
 """The same color for an algorithm in every figure."""
+
+
+def color(entry: str) -> str:
+    """An entry's color; a variant without a piece has that of the piece."""
+    piece = entry.partition("-")[2]
+    return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]] if piece else COLORS[entry]
+
 
 FRACTION = "Fraction of the optimum"
 
@@ -93,9 +100,9 @@ def _draw_cells(
         name = cell["algorithm"]
         offset = (algorithms.index(name) - (len(algorithms) - 1) / 2) * step
         y = schemes.index(cell["scheme"]) + offset
-        axes.plot([cell["low"], cell["high"]], [y, y], color=COLORS[name], linewidth=1.4)
-        axes.plot(cell["iqm"], y, "o", color=COLORS[name])
-        axes.plot(cell["worst"], y, "|", color=COLORS[name], markersize=6.0)
+        axes.plot([cell["low"], cell["high"]], [y, y], color=color(str(name)), linewidth=1.4)
+        axes.plot(cell["iqm"], y, "o", color=color(str(name)))
+        axes.plot(cell["worst"], y, "|", color=color(str(name)), markersize=6.0)
     axes.set_yticks(range(len(schemes)), schemes)
     axes.set_ylim(len(schemes) - 0.5, -0.5)
     axes.xaxis.set_major_formatter(_percent)
@@ -110,7 +117,7 @@ def _percent(value: float, _: float) -> str:
 
 
 def _handle(algorithm: str) -> Line2D:
-    return Line2D([], [], color=COLORS[algorithm], marker="o", label=label(algorithm))
+    return Line2D([], [], color=color(algorithm), marker="o", label=label(algorithm))
 
 
 def curves_figure(curves: pd.DataFrame, threshold: float) -> Figure:
@@ -153,9 +160,9 @@ def profiles_figure(profiles: pd.DataFrame, threshold: float) -> Figure:
 
 def _draw_bands(axes: Axes, rows: pd.DataFrame, x: str, y: str) -> None:
     for name, own in rows.groupby("algorithm", sort=False):
-        color = COLORS[str(name)]
-        axes.fill_between(own[x], own["low"], own["high"], color=color, alpha=0.2, linewidth=0)
-        axes.plot(own[x], own[y], color=color, linewidth=1.3, label=label(str(name)))
+        hue = color(str(name))
+        axes.fill_between(own[x], own["low"], own["high"], color=hue, alpha=0.2, linewidth=0)
+        axes.plot(own[x], own[y], color=hue, linewidth=1.3, label=label(str(name)))
     axes.margins(x=0.0)
     axes.grid(color="0.92", linewidth=0.5)
 
@@ -174,10 +181,10 @@ def improvement_bars(improvements: pd.DataFrame) -> Figure:
         axes = figure.add_subplot()
         places = range(len(pairs))
         for place, (_, pair) in zip(places, pairs.iterrows(), strict=True):
-            color = COLORS[pair["algorithm"]]
-            axes.barh(place, pair["high"] - pair["low"], 0.6, pair["low"], color=color, alpha=0.35)
+            hue = color(pair["algorithm"])
+            axes.barh(place, pair["high"] - pair["low"], 0.6, pair["low"], color=hue, alpha=0.35)
             axes.plot(
-                [pair["probability"]] * 2, [place - 0.3, place + 0.3], color=color, linewidth=1.8
+                [pair["probability"]] * 2, [place - 0.3, place + 0.3], color=hue, linewidth=1.8
             )
         axes.axvline(0.5, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
         axes.set_yticks(places, [label(name) for name in pairs["algorithm"]])

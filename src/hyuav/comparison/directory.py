@@ -98,15 +98,15 @@ class ComparisonDirectory:
             for name, scenario in scenarios.items()
         }
         self.shards = [
-            self._shard(algorithm, name, num_slots)
-            for algorithm in options.algorithm
+            self._shard(entry, name, num_slots)
+            for entry in options.entries
             for name in self.optima
             for num_slots in options.num_slots
         ]
 
     def _begin(self, config: Config) -> None:
         """Keep what was asked for, or find the same kept."""
-        hyperparameters = {name: parameters_of(name).to_dict() for name in self.options.algorithm}
+        hyperparameters = {name: parameters_of(name).to_dict() for name in self.options.entries}
         request = {**config, "hyperparameters": hyperparameters}
         file = self.path / "config.yaml"
         require_writable("output", self.path)
@@ -125,7 +125,7 @@ class ComparisonDirectory:
                 )
                 raise InputError(rejection("output", str(self.path), accepted))
 
-    def _shard(self, algorithm: str, name: str, num_slots: int) -> Shard:
+    def _shard(self, entry: str, name: str, num_slots: int) -> Shard:
         options = self.options
         configuration = RunConfiguration(
             name,
@@ -135,11 +135,12 @@ class ComparisonDirectory:
                 for scheme in options.scheme
                 for seed in range(options.seed, options.seed + options.learners)
             ),
-            algorithm,
-            parameters_of(algorithm),
+            entry.partition("-")[0],
+            parameters_of(entry),
             self._training,
         )
         return Shard(
+            entry,
             configuration,
             self._evaluation,
             options.threshold,

@@ -1,5 +1,6 @@
 """What a comparison covers: algorithms, scenarios, schemes, horizons and seeds."""
 
+import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +11,16 @@ from hyuav.evaluation import EvaluationParameters
 from hyuav.layouts import random_layout
 from hyuav.learning.algorithms import ALGORITHMS, DDPG, AlgorithmParameters
 from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import Parameters, choice, count, number, one_or_more, parameter, text
+from hyuav.parameters import (
+    Parameters,
+    choice,
+    count,
+    number,
+    one_or_more,
+    parameter,
+    sequence,
+    text,
+)
 from hyuav.recording import cores
 from hyuav.scenario import PRESETS, Scenario
 from hyuav.system import SCHEMES
@@ -20,6 +30,19 @@ PEER = "stable_baselines3"
 
 ENTRIES = (*ALGORITHMS, PEER)
 """What can be compared."""
+
+PLAIN = {name: name.removesuffix("_robust") for name in ALGORITHMS}
+"""The algorithm that each is a variant of."""
+
+PIECES = tuple(
+    dict.fromkeys(
+        field.name
+        for name, plain in PLAIN.items()
+        for field in dataclasses.fields(ALGORITHMS[name])
+        if getattr(ALGORITHMS[name](), field.name) != getattr(ALGORITHMS[plain](), field.name)
+    )
+)
+"""Hyperparameters in which a variant differs from the algorithm that it is a variant of."""
 
 LAYOUT = "layout-"
 """With its seed behind, the name of a random layout's scenario."""
@@ -38,6 +61,10 @@ class Compare(Parameters):
     algorithm: tuple[str, ...] = parameter(
         one_or_more(choice(*ENTRIES), "algorithms"), ("ddpg", "td3", "sac")
     )
+    without: tuple[str, ...] = parameter(
+        sequence(choice(*PIECES), "a list of a variant's pieces"), ()
+    )
+    """Pieces of a variant, such as ``clock``: it is compared once more for each, without it."""
     scenario: tuple[str, ...] = parameter(_any_presets, ("random_disk", "two_clusters"))
     layouts: int = parameter(count(0), 0)
     """Random layouts, besides the presets; see :func:`hyuav.layouts.random_layout`."""
@@ -59,13 +86,23 @@ class Compare(Parameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("algorithm", "scenario", "scheme", "num_slots"):
+        for name in ("algorithm", "without", "scenario", "scheme", "num_slots"):
             values = getattr(self, name)
             if len(set(values)) < len(values):
                 raise InputError(rejection(name, list(values), "values that differ"))
         if not self.scenario and not self.layouts:
             accepted = "at least one preset, or layouts >= 1"
             raise InputError(rejection("scenario", [], accepted))
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """What is compared: the algorithms, and after each variant the same without a piece."""
+        return tuple(
+            entry
+            for name in self.algorithm
+            for entry in (name, *(f"{name}-{piece}" for piece in self.without))
+            if entry == name or parameters_of(entry) != parameters_of(name)
+        )
 
     def scenarios(self) -> dict[str, Scenario]:
         """By name, the presets and then the random layouts."""
@@ -74,9 +111,21 @@ class Compare(Parameters):
         return {name: Scenario.preset(name) for name in self.scenario} | drawn
 
 
-def parameters_of(name: str) -> AlgorithmParameters:
-    """The hyperparameters with which an entry of :data:`ENTRIES` is compared."""
-    return DDPG() if name == PEER else ALGORITHMS[name]()
+def parameters_of(entry: str) -> AlgorithmParameters:
+    """The hyperparameters with which an entry is compared.
+
+    Args:
+        entry: of :data:`ENTRIES`, or with a piece of :data:`PIECES` behind a hyphen, which is then
+            as in the plain algorithm.
+    """
+    name, _, piece = entry.partition("-")
+    if name == PEER:
+        return DDPG()
+    parameters: AlgorithmParameters = ALGORITHMS[name]()
+    if not piece:
+        return parameters
+    plain = getattr(ALGORITHMS[PLAIN[name]](), piece, getattr(parameters, piece, None))
+    return type(parameters).from_dict({**parameters.to_dict(), piece: plain})
 
 
 def training_episodes(training: TrainingParameters) -> EvaluationParameters:

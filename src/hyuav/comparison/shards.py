@@ -27,6 +27,8 @@ class Shard:
     Stable-Baselines3 holds the tables alone. It is there once all of it is written.
     """
 
+    entry: str
+    """What is compared, as in :func:`hyuav.comparison.plan.parameters_of`."""
     configuration: RunConfiguration
     evaluation: EvaluationParameters
     threshold: float
@@ -38,10 +40,9 @@ class Shard:
 
     @property
     def name(self) -> str:
-        """Algorithm, scenario and horizon."""
-        configuration = self.configuration
-        horizon = configuration.scenario.num_slots
-        return f"{configuration.algorithm_name}_{configuration.scenario_name}_T{horizon}"
+        """Entry, scenario and horizon."""
+        scenario, horizon = self.configuration.scenario_name, self.configuration.scenario.num_slots
+        return f"{self.entry}_{scenario}_T{horizon}"
 
     @property
     def path(self) -> Path:
@@ -58,7 +59,7 @@ class Shard:
         partial = self.path.with_name(f"{self.name}.partial")
         if partial.exists():
             shutil.rmtree(partial)
-        if self.configuration.algorithm_name == PEER:
+        if self.entry == PEER:
             from hyuav.comparison import stable_baselines  # needs a library that is optional
 
             partial.mkdir(parents=True)
@@ -117,7 +118,7 @@ def tables(
     results, curves = [], []
     for index, (learner, sum_rate) in enumerate(zip(learners, sum_rates, strict=True)):
         identity: dict[str, Any] = {
-            "algorithm": configuration.algorithm_name,
+            "algorithm": shard.entry,
             "scenario": configuration.scenario_name,
             "scheme": learner.scheme,
             "num_slots": configuration.scenario.num_slots,

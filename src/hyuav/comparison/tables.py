@@ -14,10 +14,13 @@ from hyuav.comparison.statistics import NEAR_OPTIMAL
 from hyuav.terminal import results_table
 
 
-def label(algorithm: str) -> str:
-    """An algorithm's name in tables and figures."""
-    if algorithm == PEER:
+def label(entry: str) -> str:
+    """An entry's name in tables and figures."""
+    if entry == PEER:
         return "SB3 DDPG"
+    algorithm, _, piece = entry.partition("-")
+    if piece:
+        return f"without {piece.replace('_', ' ')}"
     acronym, *rest = algorithm.split("_")
     return " ".join([acronym.upper(), *rest])
 
