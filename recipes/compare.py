@@ -29,7 +29,7 @@ from hyuav.tracking import LoggerParameters
     Compare,
     groups={},
     sections={
-        "training": partial(TrainingParameters, num_episodes=600),
+        "training": partial(TrainingParameters, num_episodes=600, evaluation_every=5),
         "evaluation": EvaluationParameters,
         "logger": partial(LoggerParameters, mode="disabled"),
     },

@@ -28,6 +28,9 @@ from hyuav.runs import METRIC_COLUMNS, MetricsFile, RunConfiguration, RunDirecto
 _IDENTITY = ("episode", "slots", "learner", "scheme", "seed", "num_slots", "seconds")
 """Columns that say which learner's episode a row is, not what it brought."""
 
+SECONDS_BETWEEN_CHECKPOINTS = 20.0
+"""At least; a checkpoint holds all replays, of tens of megabytes."""
+
 
 @dataclass(frozen=True)
 class LoggerParameters(Parameters):
@@ -53,7 +56,7 @@ class Tracker:
     """Report every episode of a training; use it as a context manager.
 
     Metrics go to ``metrics.csv`` and, under the same names, to Weights & Biases through
-    TorchRL's logger. Checkpoints are written with every evaluation. A progress bar with the
+    TorchRL's logger. Checkpoints are written with evaluations, and at the end. A progress bar with the
     current return and the time left is shown on terminals only.
 
     Args:
@@ -92,6 +95,7 @@ class Tracker:
             "training", total=training.parameters.num_episodes, returns="-"
         )
         self._started = time.perf_counter()
+        self._saved = -math.inf
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -114,7 +118,9 @@ class Tracker:
         self._metrics.append(rows)
         if self._wandb is not None:
             self._wandb.log_metrics(_by_learner(self.names, rows), step=episode.number)
-        if episode.evaluation is not None:
+        last = episode.number == self.training.parameters.num_episodes
+        waited = time.perf_counter() - self._saved >= SECONDS_BETWEEN_CHECKPOINTS
+        if episode.evaluation is not None and (waited or last):
             self.save()
         returns = " ".join(f"{value:.1f}" for value in episode.accumulated_reward.tolist()[:5])
         self._progress.update(self._task, completed=episode.number, returns=returns)
@@ -123,6 +129,7 @@ class Tracker:
         """Write the checkpoints."""
         save_checkpoint(self.run.last_checkpoint, "training", self.training.state_dict())
         save_checkpoint(self.run.best_checkpoint, "weights", self.training.best_weights)
+        self._saved = time.perf_counter()
 
     def _rows(self, episode: Episode) -> list[dict[str, Any]]:
         seconds = round(time.perf_counter() - self._started, 3)

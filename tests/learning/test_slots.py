@@ -22,17 +22,20 @@ CASES = [
     ("ddpg", SCENARIO),
     ("ddpg", FADELESS),
     ("td3", SCENARIO),
+    ("ddpg_robust", SCENARIO),
     pytest.param("td3", FADELESS, marks=pytest.mark.slow),
+    pytest.param("td3_robust", FADELESS, marks=pytest.mark.slow),
     pytest.param("sac", SCENARIO, marks=pytest.mark.slow),
     pytest.param("sac", FADELESS, marks=pytest.mark.slow),
 ]
 
 
 def cohort(name: str, scenario: Scenario = SCENARIO, batch_size: int = 8) -> Cohort:
+    short: dict[str, Any] = {"warm_up_episodes": 5} if name.endswith("robust") else {}
     return Cohort(
         scenario,
         LEARNERS,
-        ALGORITHMS[name](hidden_sizes=(12, 8)),
+        ALGORITHMS[name](hidden_sizes=(12, 8), **short),
         replay_size=30,
         batch_size=batch_size,
         device=None,

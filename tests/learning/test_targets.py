@@ -60,3 +60,17 @@ def test_an_update_with_returns_not_known_yet_is_finite(name: str) -> None:
     algorithm.update_networks(batch, 1)
     for values in algorithm.loss.state_dict().values():
         assert bool(values.isfinite().all())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_trust_in_returns_fades(name: str) -> None:
+    algorithm = ALGORITHMS[name](hidden_sizes=(8,), return_bound=0.8, return_bound_decay=0.5).build(
+        2, 15
+    )
+    batch = mini_batch(2, 5)
+    batch[RETURN] = torch.full((2, 5, 1), -torch.inf)
+    for update in range(1, 4):
+        algorithm.update_networks(batch.clone(), update)
+    bound = algorithm.loss.value_estimator.get_buffer("bound")
+    assert bound.flatten().tolist() == pytest.approx([0.1, 0.1])
+    assert any(key.endswith(".bound") for key in algorithm.modules.state_dict())  # is resumed

@@ -95,5 +95,6 @@ def test_the_defaults_are_the_papers() -> None:
         "warm_up_episodes": 0,
         "restart_after": 0,
         "return_bound": 0.0,
+        "return_bound_decay": 1.0,
         "noise_floor": 0.0,
     }

@@ -46,6 +46,8 @@ class AlgorithmParameters(Parameters, ABC):
     its best weights; 0 for never."""
     return_bound: float = parameter(number(0.0, 1.0), 0.0)
     """Trust in returns above the target; see :class:`hyuav.learning.targets.BoundedTD0`."""
+    return_bound_decay: float = parameter(number(0.0, 1.0), 1.0)
+    """Per update."""
 
     @abstractmethod
     def build(self, learners: int, observation_size: int) -> "Algorithm":
@@ -63,13 +65,17 @@ class AlgorithmParameters(Parameters, ABC):
             self.discount, self.reward_scale, self.finite_horizon, returns=self.return_bound > 0
         )
 
-    def estimate_values(self, loss: LossModule) -> None:
+    def estimate_values(self, loss: LossModule, learners: int) -> None:
         """Give a loss its target."""
         loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
         if self.return_bound:
             plain = loss.value_estimator
             bounded = BoundedTD0(
-                bound=self.return_bound, gamma=self.discount, value_network=plain.value_network
+                learners=learners,
+                bound=self.return_bound,
+                decay=self.return_bound_decay,
+                gamma=self.discount,
+                value_network=plain.value_network,
             )
             bounded.set_keys(value=plain.tensor_keys.value)
             loss.make_value_estimator(bounded)

@@ -96,7 +96,7 @@ class SAC(AlgorithmParameters):
             reduction="none",
             scalar_output_mode="exclude",
         )
-        self.estimate_values(loss)
+        self.estimate_values(loss, learners)
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         actor_optimizer.add_param_group(

@@ -33,7 +33,7 @@ class TD3(DDPG):
             loss_function="l2",
             reduction="none",
         )
-        self.estimate_values(loss)
+        self.estimate_values(loss, learners)
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(

@@ -1,0 +1,44 @@
+"""Variants with which every learner comes near the optimum, on any layout, scheme and horizon.
+
+What each piece is for, and what is lost without it, is told in docs/results.md.
+"""
+
+from dataclasses import dataclass
+
+from hyuav.learning.algorithms.base import AlgorithmParameters, learning_rate
+from hyuav.learning.algorithms.ddpg import DDPG
+from hyuav.learning.algorithms.td3 import TD3
+from hyuav.parameters import choice, count, number, parameter, switch
+
+
+@dataclass(frozen=True)
+class Robust(AlgorithmParameters):
+    """What the variants have in common."""
+
+    actor_learning_rate: float = parameter(learning_rate, 3e-4)
+    critic_learning_rate: float = parameter(learning_rate, 3e-4)
+    discount: float = parameter(number(0.0, 1.0), 1.0, symbol="gamma")
+    target_rate: float = parameter(number(0.0, 1.0), 0.01, symbol="tau")
+    clock: bool = parameter(switch, True)
+    finite_horizon: bool = parameter(switch, True)
+    reward_scale: float = parameter(number(above=0.0), 0.05)
+    layer_norm: bool = parameter(switch, True)
+    warm_up_episodes: int = parameter(count(0), 40)
+    restart_after: int = parameter(count(0), 200)
+    return_bound: float = parameter(number(0.0, 1.0), 0.3)
+    return_bound_decay: float = parameter(number(0.0, 1.0), 0.999)
+
+
+@dataclass(frozen=True)
+class RobustDDPG(Robust, DDPG):
+    """DDPG that looks for the best flight within the horizon, and does not forget a good one."""
+
+    noise_variance: float = parameter(number(0.0, 1e6), 0.16)
+    noise_decay: float = parameter(number(0.0, 1.0), 0.985)
+    noise_decay_per: str = parameter(choice("slot", "episode"), "episode")
+    noise_floor: float = parameter(number(0.0, 1.0), 0.1)
+
+
+@dataclass(frozen=True)
+class RobustTD3(RobustDDPG, TD3):
+    """TD3 with the same pieces."""
