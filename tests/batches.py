@@ -7,15 +7,16 @@ from tensordict import TensorDict, TensorDictBase
 def mini_batch(learners: int, size: int, observation_size: int = 15) -> TensorDictBase:
     """Transitions (learners, size) with the entries that the losses read."""
     shape = (learners, size)
-    flag = torch.zeros(*shape, 1, dtype=torch.bool)
+    flag, reward = torch.zeros(*shape, 1, dtype=torch.bool), torch.randn(*shape, 1)
     return TensorDict(
         observation=torch.randn(*shape, observation_size),
         action=torch.rand(*shape, 2) * 2 - 1,
         next=TensorDict(
             observation=torch.randn(*shape, observation_size),
-            reward=torch.randn(*shape, 1),
+            reward=reward,
             done=flag,
             terminated=flag,
+            **{"return": reward.clone()},
             batch_size=shape,
         ),
         batch_size=shape,

@@ -56,8 +56,8 @@ class Tracker:
     """Report every episode of a training; use it as a context manager.
 
     Metrics go to ``metrics.csv`` and, under the same names, to Weights & Biases through
-    TorchRL's logger. Checkpoints are written with evaluations, and at the end. A progress bar with the
-    current return and the time left is shown on terminals only.
+    TorchRL's logger. Checkpoints are written with evaluations, and at the end. A progress bar with
+    the current return and the time left is shown on terminals only.
 
     Args:
         run: the training's directory.

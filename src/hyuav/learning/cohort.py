@@ -149,6 +149,7 @@ class Cohort:
             the accumulated reward (N,) in bps/Hz, and each gradient step's mean loss (N,).
         """
         self.episode += 1
+        self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
         self.algorithm.memory.finish_episode(self.replay, self.scenario.num_slots)
         return flown
@@ -161,7 +162,7 @@ class Cohort:
         if self.env.base_env.system.edge_can_saturate:
             blocks["tasks"] = draws.take_tasks(slots).contiguous()
         carrier = self.collector._carrier
-        reward, losses = compiled.fly(carrier, blocks, self.updates)
+        reward, losses = compiled.fly(carrier, blocks, self.updates, self.episode)
         self.updates += slots
         carrier.update(self.env.reset())
         return reward, losses

@@ -4,8 +4,10 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
-PERSISTENCE, SWEEP = 0.9, 2.0
-"""Correlation of a sweep's consecutive actions, and their size before they are clipped."""
+PERSISTENCE, LARGEST_VIGOUR = 0.9, 2.0
+"""Correlation of a warm-up's consecutive actions, and their size before they are clipped."""
+
+GOLDEN_RATIO = (5.0**0.5 - 1.0) / 2.0
 
 
 class GaussianNoise(TensorDictModuleBase):
@@ -48,11 +50,13 @@ class GaussianNoise(TensorDictModuleBase):
 
 
 class WarmUp(TensorDictModuleBase):
-    """Fly at random for some episodes, whatever ``action`` says, in long sweeps over the map.
+    """Fly at random for some episodes, whatever ``action`` says: hovering, roaming or sweeping.
 
     An action is an autoregressive Gaussian process of unit variance, begun anew in each episode,
-    times :data:`SWEEP`, and clipped: mostly full speed ahead, in a direction that is kept for
-    some ten slots. Independent actions would only tremble about the start.
+    times the episode's vigour, and clipped. The vigours fill the range from 0 to
+    :data:`LARGEST_VIGOUR` evenly, in the order of the golden ratio's multiples: at the least the
+    helper stays about the start, at the most it crosses the map at full speed. Independent actions
+    would only tremble about the start.
 
     Args:
         learners: N; each flies its own way.
@@ -75,6 +79,7 @@ class WarmUp(TensorDictModuleBase):
         normal = torch.randn_like(action)
         turned = PERSISTENCE * self.heading + (1.0 - PERSISTENCE**2) ** 0.5 * normal
         self.heading.copy_(torch.where(begins, normal, turned))
-        sweep = (SWEEP * self.heading).clamp(-1.0, 1.0)
-        tensordict["action"] = torch.where(self.episode > self._episodes, action, sweep)
+        vigour = LARGEST_VIGOUR * torch.frac(self.episode * GOLDEN_RATIO)
+        roaming = (vigour * self.heading).clamp(-1.0, 1.0)
+        tensordict["action"] = torch.where(self.episode > self._episodes, action, roaming)
         return tensordict

@@ -72,7 +72,7 @@ class CompiledSlots:
         }
 
     def fly(
-        self, carrier: TensorDictBase, draws: Mapping[str, Tensor], updates: int
+        self, carrier: TensorDictBase, draws: Mapping[str, Tensor], updates: int, episode: int
     ) -> tuple[Tensor, dict[str, Tensor]]:
         """Fly and learn for as many slots as there are draws.
 
@@ -84,6 +84,7 @@ class CompiledSlots:
                 ``fading`` (slots, N, 3 U + 2) and ``tasks`` (slots, N, 2, U) where the
                 environment needs them.
             updates: taken before.
+            episode: which one it is, from 1.
 
         Returns:
             the accumulated reward (N,) in bps/Hz, and each gradient step's mean loss (N,).
@@ -91,7 +92,7 @@ class CompiledSlots:
         slots = len(draws["exploration"])
         self._begin(carrier)
         counts = dict.fromkeys(self._adam, 0)
-        blocks = {**draws, "corrections": self._corrections(updates, slots)}
+        blocks = {**draws, "corrections": self._corrections(updates, slots, episode)}
         with torch.no_grad():
             rows = zip(*(blocks[name] for name in self._names), strict=True)
             for slot, inputs in enumerate(rows):
@@ -119,13 +120,17 @@ class CompiledSlots:
         for step in self._algorithm.steps:
             self._adam[step.name].set_count(updates // step.every)
 
-    def _corrections(self, updates: int, slots: int) -> Tensor:
-        """Adam's bias corrections in each slot and gradient step: (slots, steps, 2)."""
+    def _corrections(self, updates: int, slots: int, episode: int) -> Tensor:
+        """Adam's bias corrections in each slot and gradient step: (slots, steps, 2).
+
+        The first is multiplied by the factor of the episode's learning rates.
+        """
         index = torch.arange(updates + 1, updates + slots + 1, dtype=torch.float64).unsqueeze(-1)
         every = torch.tensor([float(step.every) for step in self._algorithm.steps])
         betas = [self._adam[step.name].betas for step in self._algorithm.steps]
         powers = torch.tensor(betas, dtype=torch.float64) ** (index // every).unsqueeze(-1)
         first, second = (1.0 / (1.0 - powers)).unbind(dim=-1)
+        first = first * self._algorithm.learning_rate_factor(episode)
         return torch.stack([first, second.sqrt()], dim=-1).float().to(self._env.device)
 
     def _examples(self, batch_size: int) -> dict[str, Tensor]:
@@ -224,7 +229,7 @@ class AdamState:
                     state["exp_avg_sq"] = torch.zeros_like(weight)
                 moments = state["exp_avg"], state["exp_avg_sq"]
                 self.weights.append(weight)
-                self._rows.append((weight.data, *moments, state["step"], group["lr"]))
+                self._rows.append((weight.data, *moments, state["step"], group["initial_lr"]))
 
     def set_count(self, count: int) -> None:
         """How many steps have been taken."""

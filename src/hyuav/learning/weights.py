@@ -45,7 +45,9 @@ def draw_weights(loss: LossModule, seeds: Sequence[int]) -> None:
 def copy_weights(loss: LossModule) -> dict[str, Tensor]:
     """A copy of all networks and targets of N learners, by name, without hyperparameters."""
     return {
-        name: values.detach().clone() for name, values in loss.state_dict().items() if values.ndim
+        name: values.detach().clone()
+        for name, values in loss.state_dict().items()
+        if values.ndim and not name.startswith("_value_estimator")
     }
 
 

@@ -30,6 +30,8 @@ class AlgorithmParameters(Parameters, ABC):
     activation: str = parameter(choice(*ACTIVATIONS), "tanh")
     actor_learning_rate: float = parameter(learning_rate, 1e-4)
     critic_learning_rate: float = parameter(learning_rate, 1e-4)
+    learning_rate_decay: float = parameter(number(0.0, 1.0), 1.0)
+    """Factor of all learning rates after every episode."""
     discount: float = parameter(number(0.0, 1.0), 0.95, symbol="gamma")
     target_rate: float = parameter(number(0.0, 1.0), 0.005, symbol="tau")
     clock: bool = parameter(switch, False)
@@ -125,8 +127,20 @@ class Algorithm:
     memory: Memory = Memory()
     explorer_normals: int = 1
     """Standard normal tensors (N, 2) that the explorer draws for each slot."""
+    learning_rate_decay: float = 1.0
+    """Factor of all learning rates after every episode."""
     restart_after: int = 0
     """Episodes from which on actors go back to their best weights; 0 for never."""
+
+    def learning_rate_factor(self, episode: int) -> float:
+        """Of the learning rates in an episode, from 1."""
+        return self.learning_rate_decay ** (episode - 1)
+
+    def set_learning_rates(self, episode: int) -> None:
+        """Let the optimizers know what episode it is."""
+        for step in self.steps:
+            for group in step.optimizer.param_groups:
+                group["lr"] = group["initial_lr"] * self.learning_rate_factor(episode)
 
     def restarts(self, episode: int) -> bool:
         """Whether actors go back to their best weights after this episode's evaluation."""
@@ -179,4 +193,5 @@ class Algorithm:
 
 def adam(weights: TensorDictParams, learning_rate: float) -> torch.optim.Adam:
     """Adam as the paper uses it, in PyTorch's fused form."""
-    return torch.optim.Adam(weights.parameters(), lr=learning_rate, fused=True)
+    group = {"params": list(weights.parameters()), "initial_lr": learning_rate}
+    return torch.optim.Adam([group], lr=learning_rate, fused=True)

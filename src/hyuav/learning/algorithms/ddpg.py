@@ -47,6 +47,7 @@ class DDPG(AlgorithmParameters):
             target=SoftUpdate(loss, tau=self.target_rate),
             memory=self.memory,
             explorer_normals=self.explorer_normals,
+            learning_rate_decay=self.learning_rate_decay,
             restart_after=self.restart_after,
         )
 

@@ -100,7 +100,11 @@ class SAC(AlgorithmParameters):
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         actor_optimizer.add_param_group(
-            {"params": [loss.log_alpha], "lr": self.temperature_learning_rate}
+            {
+                "params": [loss.log_alpha],
+                "lr": self.temperature_learning_rate,
+                "initial_lr": self.temperature_learning_rate,
+            }
         )
         mean = TensorDictModule(nn.Tanh(), in_keys=["loc"], out_keys=["action"])
         return Algorithm(
@@ -119,5 +123,6 @@ class SAC(AlgorithmParameters):
             target=SoftUpdate(loss, tau=self.target_rate),
             memory=self.memory,
             explorer_normals=self.explorer_normals,
+            learning_rate_decay=self.learning_rate_decay,
             restart_after=self.restart_after,
         )

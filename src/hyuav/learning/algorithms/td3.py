@@ -58,5 +58,6 @@ class TD3(DDPG):
             target_every=self.actor_every,
             memory=self.memory,
             explorer_normals=self.explorer_normals,
+            learning_rate_decay=self.learning_rate_decay,
             restart_after=self.restart_after,
         )
