@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 from hyuav.benchmark.plan import require_peers
 from hyuav.errors import InputError, rejection
@@ -12,13 +11,13 @@ from hyuav.layouts import random_layout
 from hyuav.learning.algorithms import ALGORITHMS, DDPG, AlgorithmParameters
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import (
+    Converter,
     Parameters,
     choice,
     count,
     number,
     one_or_more,
     parameter,
-    sequence,
     text,
 )
 from hyuav.recording import cores
@@ -47,11 +46,14 @@ PIECES = tuple(
 LAYOUT = "layout-"
 """With its seed behind, the name of a random layout's scenario."""
 
-_presets = one_or_more(choice(*PRESETS), f"a list of {', '.join(PRESETS)}")
+
+def _any(convert: Converter) -> Converter:
+    """Accept an empty list too."""
+    return lambda name, value: () if value in ([], ()) else convert(name, value)
 
 
-def _any_presets(name: str, value: Any) -> Any:
-    return () if value in ([], ()) else _presets(name, value)
+_presets = _any(one_or_more(choice(*PRESETS), f"a list of {', '.join(PRESETS)}"))
+_pieces = _any(one_or_more(choice(*PIECES), f"a list of {', '.join(PIECES)}"))
 
 
 @dataclass(frozen=True)
@@ -61,11 +63,9 @@ class Compare(Parameters):
     algorithm: tuple[str, ...] = parameter(
         one_or_more(choice(*ENTRIES), "algorithms"), ("ddpg", "td3", "sac")
     )
-    without: tuple[str, ...] = parameter(
-        sequence(choice(*PIECES), "a list of a variant's pieces"), ()
-    )
+    without: tuple[str, ...] = parameter(_pieces, ())
     """Pieces of a variant, such as ``clock``: it is compared once more for each, without it."""
-    scenario: tuple[str, ...] = parameter(_any_presets, ("random_disk", "two_clusters"))
+    scenario: tuple[str, ...] = parameter(_presets, ("random_disk", "two_clusters"))
     layouts: int = parameter(count(0), 0)
     """Random layouts, besides the presets; see :func:`hyuav.layouts.random_layout`."""
     layouts_seed: int = parameter(count(0), 1000)
