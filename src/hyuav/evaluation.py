@@ -27,23 +27,32 @@ EVALUATION_FILE, FLIGHTS_FILE = "evaluation.json", "flights.parquet"
 
 LABELS = {
     "proposed": "Proposed",
+    "proposed_paper": "Proposed, paper",
     "ja_ot": "Ja-OT",
+    "ja_ot_paper": "Ja-OT, paper",
     "re_ot": "Re-OT",
+    "re_ot_paper": "Re-OT, paper",
     "re_lt": "Re-LT",
     "ja_lt": "Ja-LT",
     "optimum": "Optimum",
     "ja_optimum": "Ja-optimum",
     "re_optimum": "Re-optimum",
 }
-"""The schemes in the order of the table, with the names that the paper gives them."""
+"""The schemes in the order of the table, with the names that the paper gives them.
+
+Those that are learned by the paper's own algorithm, where another one is beside it, say so.
+"""
 
 MODE_RULES = {
     "proposed": "hybrid",
+    "proposed_paper": "hybrid",
     "optimum": "hybrid",
     "ja_ot": "jamming",
+    "ja_ot_paper": "jamming",
     "ja_lt": "jamming",
     "ja_optimum": "jamming",
     "re_ot": "relay",
+    "re_ot_paper": "relay",
     "re_lt": "relay",
     "re_optimum": "relay",
 }

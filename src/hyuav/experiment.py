@@ -28,6 +28,9 @@ from hyuav.tracking import LoggerParameters, Tracker
 LEARNED = {"hybrid": "proposed", "relay": "re_ot", "jamming": "ja_ot"}
 """The learned scheme for each rule of who chooses the mode."""
 
+LEARNED_AS_IN_PAPER = {rule: f"{scheme}_paper" for rule, scheme in LEARNED.items()}
+"""The same by the paper's own algorithm, where another one is beside it."""
+
 LINEAR: dict[str, Callable[[Scenario], ConstantVelocity]] = {"re_lt": re_lt, "ja_lt": ja_lt}
 
 
@@ -135,8 +138,15 @@ def select_initial_weights(
     return join_learners(chosen), best
 
 
-def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[str, list[Policy]]:
+def learned_policies(
+    runs: Sequence[RunDirectory], scenario: Scenario, schemes: Mapping[str, str] = LEARNED
+) -> dict[str, list[Policy]]:
     """The best actors of trainings for the scenario's horizon, as Proposed, Re-OT and Ja-OT.
+
+    Args:
+        runs: of the trainings.
+        scenario: to fly.
+        schemes: that the actors count as, by the rule of who chooses the mode.
 
     Raises:
         InputError: a run or its checkpoint cannot be read, its actors observe another number of
@@ -155,7 +165,7 @@ def learned_policies(runs: Sequence[RunDirectory], scenario: Scenario) -> dict[s
             horizon = learner.num_slots or configuration.scenario.num_slots
             horizons.add(horizon)
             if horizon == scenario.num_slots:
-                by_scheme.setdefault(LEARNED[learner.scheme], []).append(index)
+                by_scheme.setdefault(schemes[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
             module = LearnedPolicy(scenario, algorithm, weights, indices)
             policies.setdefault(scheme, []).append(Policy(module, len(indices), algorithm.clock))
@@ -228,7 +238,10 @@ def _percent(fraction: float | None) -> str:
 
 
 def draw_figures(
-    directory: Path, scenario: Scenario, evaluation: Evaluation, metrics: pd.DataFrame
+    directory: Path,
+    scenario: Scenario,
+    evaluation: Evaluation,
+    runs: Sequence[tuple[RunDirectory, Mapping[str, str]]],
 ) -> None:
     """Write the learning curves, the flight map and the maps of the secrecy sum-rate.
 
@@ -236,15 +249,16 @@ def draw_figures(
         directory: for the PNG and PDF files.
         scenario: that was flown.
         evaluation: whose flights are drawn and whose optima bound the curves.
-        metrics: a row per episode and learner.
+        runs: whose learning is drawn, with the schemes that their learners count as.
     """
     results = evaluation.summary["schemes"]
     curves: dict[str, pd.DataFrame] = {}
     optima: dict[str, float] = {}
-    for scheme, rows in metrics.groupby("scheme"):
-        name = LEARNED[str(scheme)]
-        curves[name] = rows.pivot_table("accumulated_reward", "episode", "learner")
-        optima[name] = results[OPTIMA[str(scheme)]]["secrecy_sum_rate"]["mean"]
+    for run, schemes in runs:
+        for rule, rows in run.metrics().groupby("scheme"):
+            name = schemes[str(rule)]
+            curves[name] = rows.pivot_table("accumulated_reward", "episode", "learner")
+            optima[name] = results[OPTIMA[str(rule)]]["secrecy_sum_rate"]["mean"]
     in_order = {name: curves[name] for name in LABELS if name in curves}
     save_figure(learning_curves(in_order, optima), directory, "learning_curves")
     save_figure(flight_map(scenario, evaluation.flights), directory, "flight_map")

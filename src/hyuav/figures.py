@@ -29,6 +29,8 @@ COLORS = {
 }
 """The same color for a scheme in every figure."""
 
+COLORS |= {f"{scheme}_paper": COLORS[scheme] for scheme in ("proposed", "ja_ot", "re_ot")}
+
 STYLE: Any = {
     "font.size": 8,
     "axes.linewidth": 0.6,
@@ -68,6 +70,7 @@ def learning_curves(
 
     Args:
         accumulated_reward: by scheme, a column per learner and a row per episode, in bps/Hz.
+            What the paper's own algorithm learned beside another one is dashed.
         optima: by scheme, what the best flight earns on average, in bps/Hz.
     """
     with mpl.rc_context(STYLE):
@@ -80,9 +83,9 @@ def learning_curves(
             if rewards.shape[1] > 1:
                 low, high = smooth.min(axis=1), smooth.max(axis=1)
                 axes.fill_between(episodes, low, high, color=color, alpha=0.2, linewidth=0)
-            axes.plot(
-                episodes, smooth.mean(axis=1), color=color, linewidth=1.3, label=LABELS[scheme]
-            )
+            line = (0, (4, 1.5)) if scheme.endswith("_paper") else "solid"
+            mean = smooth.mean(axis=1)
+            axes.plot(episodes, mean, color=color, ls=line, linewidth=1.3, label=LABELS[scheme])
             if scheme in optima:
                 axes.axhline(optima[scheme], color=color, linewidth=0.9, linestyle=(0, (1, 1.5)))
         axes.plot([], [], color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)), label="its optimum")

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from hyuav.benchmark import plan
+from hyuav.learning.algorithms import RobustDDPG
 from hyuav.runs import RunDirectory
 
 Call = Callable[..., None]
@@ -131,6 +132,21 @@ def test_shards_of_random_layouts_and_of_a_peer_train_in_processes(
     assert "torchrl" not in printed.out + printed.err
 
 
+def test_a_variant_is_compared_without_its_pieces(
+    call: Call, tmp_path: Path, capsys: Printed
+) -> None:
+    pieces = ["algorithm=[ddpg,ddpg_robust]", "without=[clock,restart_after]"]
+    call("compare", *pieces, *TINY, "scenario=two_clusters", "scheme=relay", "learners=1")
+    here = tmp_path / "here"
+    entries = ["ddpg", "ddpg_robust", "ddpg_robust-clock", "ddpg_robust-restart_after"]
+    assert pd.read_parquet(here / "results.parquet")["algorithm"].tolist() == entries
+    run = RunDirectory(here / "shards" / "ddpg_robust-clock_two_clusters_T8")
+    assert run.configuration().algorithm == RobustDDPG(clock=False)
+    printed = capsys.readouterr().out
+    assert "without clock" in printed
+    assert "without restart after" in printed
+
+
 def test_a_directory_of_another_comparison_is_left_alone(
     call: Call, tmp_path: Path, capsys: Printed
 ) -> None:
@@ -149,6 +165,8 @@ REFUSALS = [
     (["algorithm=ppo"], "algorithm = 'ppo': expected one of ddpg, td3, sac"),
     (["algorithm=[ddpg,dpg]"], "algorithm[1] = 'dpg': expected one of ddpg, td3, sac"),
     (["algorithm=[sac,sac]"], "algorithm = ['sac', 'sac']: expected values that differ"),
+    (["without=tau"], "without = 'tau': expected one of actor_learning_rate, "),
+    (["without=[clock,clock]"], "without = ['clock', 'clock']: expected values that differ"),
     (["scenario=square"], "scenario = 'square': expected one of random_disk, two_clusters"),
     (["scenario=[]"], "scenario = []: expected at least one preset, or layouts >= 1"),
     (["layouts=-1"], "layouts = -1: expected a whole number >= 0"),

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from hyuav import Scenario
+from hyuav.learning.algorithms import DDPG
 from hyuav.runs import RunDirectory
 
 RECIPES = Path(__file__).parents[2] / "recipes"
@@ -140,7 +141,11 @@ def test_the_main_job_trains_evaluates_and_draws(call: Call, tmp_path: Path) -> 
         *TINY,
     )
     summary = json.loads((tmp_path / "job" / "evaluation.json").read_text())
-    assert len(summary["schemes"]) == 8
+    assert len(summary["schemes"]) == 11
+    assert {"proposed", "proposed_paper", "re_ot_paper", "ja_ot_paper"} <= set(summary["schemes"])
+    paper = RunDirectory(tmp_path / "job" / "as_in_paper").configuration()
+    assert paper.algorithm == DDPG()
+    assert RunDirectory(tmp_path / "job").configuration().algorithm_name == "ddpg_robust"
     figures = {path.name for path in (tmp_path / "job" / "figures").iterdir()}
     assert figures == {
         f"{name}.{suffix}"
@@ -160,7 +165,7 @@ def test_a_straight_flight_too_fast_for_the_horizon_is_left_out_and_named(
 
 
 REFUSALS = [
-    (["train", "algorithm=ppo"], "algorithm = 'ppo': expected one of ddpg, sac, td3"),
+    (["train", "algorithm=ppo"], "algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, td3, td3_robust"),
     (["train", "scenario=square"], "scenario = 'square': expected one of"),
     (["train", "scenario.ue_powr=1"], "scenario: unknown field 'ue_powr': did you mean 'ue_power'"),
     (["train", "learner=3"], "configuration: unknown field 'learner': did you mean 'learners'"),
@@ -212,4 +217,4 @@ def test_a_mistake_on_the_command_line_ends_the_process_with_status_2(tmp_path: 
         check=False,
     )
     assert ended.returncode == 2
-    assert ended.stderr == "error: algorithm = 'ppo': expected one of ddpg, sac, td3\n"
+    assert ended.stderr == "error: algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, td3, td3_robust\n"

@@ -14,4 +14,14 @@ ALGORITHMS: dict[str, type[DDPG | TD3 | SAC]] = {
     "td3_robust": RobustTD3,
 }
 
-__all__ = ["ALGORITHMS", "DDPG", "SAC", "TD3", "Algorithm", "AlgorithmParameters", "GradientStep"]
+__all__ = [
+    "ALGORITHMS",
+    "DDPG",
+    "SAC",
+    "TD3",
+    "Algorithm",
+    "AlgorithmParameters",
+    "GradientStep",
+    "RobustDDPG",
+    "RobustTD3",
+]
