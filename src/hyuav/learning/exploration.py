@@ -4,7 +4,7 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
-PERSISTENCE, LARGEST_VIGOUR = 0.9, 2.0
+PERSISTENCE, LARGEST_VIGOUR = 0.97, 4.0
 """Correlation of a warm-up's consecutive actions, and their size before they are clipped."""
 
 GOLDEN_RATIO = (5.0**0.5 - 1.0) / 2.0
@@ -53,7 +53,7 @@ class WarmUp(TensorDictModuleBase):
     """Fly at random for some episodes, whatever ``action`` says: hovering, roaming or sweeping.
 
     An action is an autoregressive Gaussian process of unit variance, begun anew in each episode,
-    times the episode's vigour, and clipped. The vigours fill the range from 0 to
+    times the episode's vigour, and clipped. The vigours' roots fill the range from 0 to that of
     :data:`LARGEST_VIGOUR` evenly, in the order of the golden ratio's multiples: at the least the
     helper stays about the start, at the most it crosses the map at full speed. Independent actions
     would only tremble about the start.
@@ -79,7 +79,7 @@ class WarmUp(TensorDictModuleBase):
         normal = torch.randn_like(action)
         turned = PERSISTENCE * self.heading + (1.0 - PERSISTENCE**2) ** 0.5 * normal
         self.heading.copy_(torch.where(begins, normal, turned))
-        vigour = LARGEST_VIGOUR * torch.frac(self.episode * GOLDEN_RATIO)
+        vigour = LARGEST_VIGOUR * torch.frac(self.episode * GOLDEN_RATIO).square()
         roaming = (vigour * self.heading).clamp(-1.0, 1.0)
         tensordict["action"] = torch.where(self.episode > self._episodes, action, roaming)
         return tensordict

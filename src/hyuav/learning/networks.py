@@ -78,10 +78,33 @@ class LearnerMLP(nn.Module):
 
         A single slot of each learner, (N, k), is taken as well.
         """
+        return self._through(self.layers, *inputs)
+
+    def before_output(self, *inputs: Tensor) -> Tensor:
+        """The same up to the last layer's result, before ``output`` is applied to it."""
+        return self._through(self.layers[:-1], *inputs)
+
+    def _through(self, layers: nn.Module, *inputs: Tensor) -> Tensor:
         joined = inputs[0] if len(inputs) == 1 else torch.cat(inputs, dim=-1)
         learners, features = joined.shape[0], joined.shape[-1]
-        outputs = self.layers(joined.reshape(learners, -1, features))
+        outputs: Tensor = layers(joined.reshape(learners, -1, features))
         return outputs.reshape(*joined.shape[:-1], outputs.shape[-1])
+
+
+class StretchedTanh(nn.Module):
+    """A tanh times ``stretch``, cut off at -1 and 1, which it so reaches where it is not yet flat.
+
+    Args:
+        stretch: at least 1; a plain tanh for 1.
+    """
+
+    def __init__(self, stretch: float) -> None:
+        super().__init__()
+        self.stretch = stretch
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        """Map (...) to [-1, 1] (...)."""
+        return (self.stretch * inputs.tanh()).clamp(-1.0, 1.0)
 
 
 def make_critic(
@@ -107,14 +130,21 @@ def make_critic(
 
 
 def make_actor(
-    learners: int, observation_size: int, hidden_sizes: Sequence[int], activation: str
+    learners: int,
+    observation_size: int,
+    hidden_sizes: Sequence[int],
+    activation: str,
+    *,
+    stretch: float = 1.0,
 ) -> TensorDictModule:
     """mu(s) of N learners.
 
-    Reads ``observation`` (N, ..., U + 5), writes ``action`` (N, ..., 2) in [-1, 1] by a tanh.
+    Reads ``observation`` (N, ..., U + 5), writes ``action`` (N, ..., 2) in [-1, 1] by a tanh,
+    which may be stretched.
     """
+    output = StretchedTanh(stretch) if stretch > 1.0 else nn.Tanh()
     return TensorDictModule(
-        LearnerMLP(learners, observation_size, hidden_sizes, 2, activation, nn.Tanh()),
+        LearnerMLP(learners, observation_size, hidden_sizes, 2, activation, output),
         in_keys=["observation"],
         out_keys=["action"],
     )

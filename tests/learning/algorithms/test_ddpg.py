@@ -95,6 +95,8 @@ def test_the_defaults_are_the_papers() -> None:
         "warm_up_episodes": 0,
         "restart_after": 0,
         "learning_rate_decay": 1.0,
+        "action_stretch": 1.0,
+        "saturation_penalty": 0.0,
         "return_bound": 0.0,
         "return_bound_decay": 1.0,
         "noise_floor": 0.0,

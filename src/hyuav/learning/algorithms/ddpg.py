@@ -24,7 +24,8 @@ class DDPG(AlgorithmParameters):
     def build(self, learners: int, observation_size: int) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
         sizes = (learners, observation_size, self.hidden_sizes, self.activation)
-        actor, critic = make_actor(*sizes), make_critic(*sizes, layer_norm=self.layer_norm)
+        actor = make_actor(*sizes, stretch=self.action_stretch)
+        critic = make_critic(*sizes, layer_norm=self.layer_norm)
         loss = DDPGLoss(
             actor,
             critic,
@@ -42,7 +43,11 @@ class DDPG(AlgorithmParameters):
             loss=loss,
             steps=(
                 GradientStep("critic", lambda batch: loss.loss_value(batch)[0], critic_optimizer),
-                GradientStep("actor", lambda batch: loss.loss_actor(batch)[0], actor_optimizer),
+                GradientStep(
+                    "actor",
+                    lambda batch: self.unsaturated(loss.loss_actor(batch)[0], loss, batch),
+                    actor_optimizer,
+                ),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
             memory=self.memory,

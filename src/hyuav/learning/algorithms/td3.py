@@ -22,7 +22,8 @@ class TD3(DDPG):
     def build(self, learners: int, observation_size: int) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
         sizes = (learners, observation_size, self.hidden_sizes, self.activation)
-        actor, critic = make_actor(*sizes), make_critic(*sizes, layer_norm=self.layer_norm)
+        actor = make_actor(*sizes, stretch=self.action_stretch)
+        critic = make_critic(*sizes, layer_norm=self.layer_norm)
         loss = TD3Loss(
             actor,
             critic,
@@ -49,7 +50,7 @@ class TD3(DDPG):
                 ),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.actor_loss(batch)[0],
+                    lambda batch: self.unsaturated(loss.actor_loss(batch)[0], loss, batch),
                     actor_optimizer,
                     every=self.actor_every,
                 ),
