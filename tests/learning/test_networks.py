@@ -5,7 +5,13 @@ import torch
 from tensordict import TensorDict
 from torch import nn
 
-from hyuav.learning.networks import LearnerLinear, LearnerMLP, make_actor, make_critic
+from hyuav.learning.networks import (
+    LearnerLinear,
+    LearnerMLP,
+    StretchedTanh,
+    make_actor,
+    make_critic,
+)
 
 
 def test_each_learner_has_a_layer_of_its_own() -> None:
@@ -50,3 +56,25 @@ def test_hidden_layers_have_the_sizes_of_the_paper_by_default() -> None:
         layer.weight.shape[1:] for layer in network.modules() if isinstance(layer, LearnerLinear)
     ]
     assert shapes == [(15, 300), (300, 100), (100, 100), (100, 2)]
+
+
+def test_a_stretched_tanh_reaches_full_speed_where_it_is_not_flat() -> None:
+    stretched = StretchedTanh(1.04)
+    inputs = torch.tensor([-9.0, -2.0, 0.0, 0.5, 2.0, 9.0])
+    expected = torch.tensor([-1.0, -1.0, 0.0, 1.04 * math.tanh(0.5), 1.0, 1.0])
+    torch.testing.assert_close(stretched(inputs), expected)
+
+
+def test_an_actor_shows_its_output_before_the_tanh() -> None:
+    actor = make_actor(2, 15, (8,), "tanh", stretch=1.1)
+    data = TensorDict(observation=torch.randn(2, 6, 15), batch_size=[2, 6])
+    before = actor.module.before_output(data["observation"])
+    action = (1.1 * before.tanh()).clamp(-1.0, 1.0)
+    torch.testing.assert_close(actor(data)["action"], action)
+
+
+def test_normalized_layers_do_not_depend_on_the_scale_of_their_inputs() -> None:
+    network = LearnerMLP(1, 3, (8,), 1, "tanh", layer_norm=True)
+    network.get_parameter("layers.0.bias").data.zero_()
+    inputs = torch.randn(1, 5, 3)
+    torch.testing.assert_close(network(inputs), network(10.0 * inputs), rtol=1e-3, atol=1e-4)

@@ -14,6 +14,7 @@ from hyuav import Scenario
 from hyuav.learning.algorithms import DDPG
 from hyuav.runs import RunDirectory
 
+NAMES = "ddpg, ddpg_robust, sac, td3, td3_robust"
 RECIPES = Path(__file__).parents[2] / "recipes"
 Call = Callable[..., None]
 
@@ -165,7 +166,10 @@ def test_a_straight_flight_too_fast_for_the_horizon_is_left_out_and_named(
 
 
 REFUSALS = [
-    (["train", "algorithm=ppo"], "algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, td3, td3_robust"),
+    (
+        ["train", "algorithm=ppo"],
+        "algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, td3, td3_robust",
+    ),
     (["train", "scenario=square"], "scenario = 'square': expected one of"),
     (["train", "scenario.ue_powr=1"], "scenario: unknown field 'ue_powr': did you mean 'ue_power'"),
     (["train", "learner=3"], "configuration: unknown field 'learner': did you mean 'learners'"),
@@ -217,4 +221,7 @@ def test_a_mistake_on_the_command_line_ends_the_process_with_status_2(tmp_path: 
         check=False,
     )
     assert ended.returncode == 2
-    assert ended.stderr == "error: algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, td3, td3_robust\n"
+    assert (
+        ended.stderr
+        == "error: algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, td3, td3_robust\n"
+    )
