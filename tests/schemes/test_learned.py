@@ -15,9 +15,10 @@ SCENARIO = Scenario.preset("two_clusters")
 @pytest.mark.parametrize("batch_size", [(), (4,), (2, 3)])
 def test_a_saved_actor_flies_any_batch(name: str, batch_size: tuple[int, ...]) -> None:
     algorithm = ALGORITHMS[name](hidden_sizes=(8,))
-    weights = copy_weights(algorithm.build(3, 15).loss)
+    weights = copy_weights(algorithm.build(3, 15 + algorithm.clock).loss)
     policy = LearnedPolicy(SCENARIO, algorithm, weights, learner=2)
-    flown = make_env(SCENARIO, batch_size=batch_size).rollout(5, policy)
+    env = make_env(SCENARIO, batch_size=batch_size, clock=algorithm.clock)
+    flown = env.rollout(5, policy)
     assert flown["action"].shape == (*batch_size, 5, 2)
     assert not flown["action"].requires_grad
 

@@ -61,7 +61,7 @@ class Compare(Parameters):
     """What is compared, and how the work is divided."""
 
     algorithm: tuple[str, ...] = parameter(
-        one_or_more(choice(*ENTRIES), "algorithms"), ("ddpg", "td3", "sac")
+        one_or_more(choice(*ENTRIES), "algorithms"), ("ddpg", "ddpg_robust", "td3", "sac")
     )
     without: tuple[str, ...] = parameter(_pieces, ())
     """Pieces of a variant, such as ``clock``: it is compared once more for each, without it."""
