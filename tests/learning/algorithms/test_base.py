@@ -6,8 +6,7 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from batches import mini_batch
-from hyuav.learning.algorithms import ALGORITHMS, DDPG, TD3, Algorithm
-from hyuav.learning.algorithms.base import UNSATURATED, saturation
+from hyuav.learning.algorithms import ALGORITHMS, Algorithm
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
 
 NAMES = sorted(ALGORITHMS)
@@ -74,25 +73,3 @@ def test_the_actor_follows_what_the_explorer_learns(name: str) -> None:
     for index in range(1, 5):
         algorithm.update_networks(mini_batch(2, 20), index)
     assert not torch.equal(before, algorithm.actor(data.clone())["action"])
-
-
-def test_an_actor_is_saturated_beyond_a_bound() -> None:
-    loss, batch = DDPG(hidden_sizes=(8,)).build(2, 15).loss, mini_batch(2, 5)
-    last = loss.actor_network_params["module", "layers", "2", "bias"].data
-    assert not saturation(loss, batch).any()
-    last.copy_(torch.tensor([[[0.0, 3.0]], [[-100.0, 3.0]]]) + UNSATURATED)
-    with torch.no_grad():
-        loss.actor_network_params["module", "layers", "2", "weight"].data.zero_()
-    expected = torch.tensor([9.0, (98.0 - UNSATURATED) ** 2 + 9.0])
-    torch.testing.assert_close(saturation(loss, batch), expected.unsqueeze(-1).expand(2, 5))
-
-
-@pytest.mark.parametrize("kind", [DDPG, TD3])
-def test_a_saturated_actor_is_drawn_back(kind: type[DDPG]) -> None:
-    torch.manual_seed(0)
-    algorithm = kind(hidden_sizes=(8,), saturation_penalty=1.0).build(2, 15)
-    bias = algorithm.loss.actor_network_params["module", "layers", "2", "bias"].data
-    bias.fill_(9.0)
-    for index in range(1, 5):
-        algorithm.update_networks(mini_batch(2, 20), index)
-    assert bool((bias < 9.0).all())

@@ -2,11 +2,13 @@
 
 import copy
 
+import pytest
 import torch
 from torch import Tensor, nn
 
 from batches import mini_batch
-from hyuav.learning.algorithms import DDPG
+from hyuav.learning.algorithms import DDPG, TD3
+from hyuav.learning.algorithms.ddpg import UNSATURATED, saturation
 
 SIZES = (15, 12, 8, 8, 2)
 
@@ -101,3 +103,25 @@ def test_the_defaults_are_the_papers() -> None:
         "return_bound_decay": 1.0,
         "noise_floor": 0.0,
     }
+
+
+def test_an_actor_is_saturated_beyond_a_bound() -> None:
+    loss, batch = DDPG(hidden_sizes=(8,)).build(2, 15).loss, mini_batch(2, 5)
+    last = loss.actor_network_params["module", "layers", "2", "bias"].data
+    assert not saturation(loss, batch).any()
+    last.copy_(torch.tensor([[[0.0, 3.0]], [[-100.0, 3.0]]]) + UNSATURATED)
+    with torch.no_grad():
+        loss.actor_network_params["module", "layers", "2", "weight"].data.zero_()
+    expected = torch.tensor([9.0, (98.0 - UNSATURATED) ** 2 + 9.0])
+    torch.testing.assert_close(saturation(loss, batch), expected.unsqueeze(-1).expand(2, 5))
+
+
+@pytest.mark.parametrize("kind", [DDPG, TD3])
+def test_a_saturated_actor_is_drawn_back(kind: type[DDPG]) -> None:
+    torch.manual_seed(0)
+    algorithm = kind(hidden_sizes=(8,), saturation_penalty=1.0).build(2, 15)
+    bias = algorithm.loss.actor_network_params["module", "layers", "2", "bias"].data
+    bias.fill_(9.0)
+    for index in range(1, 5):
+        algorithm.update_networks(mini_batch(2, 20), index)
+    assert bool((bias < 9.0).all())

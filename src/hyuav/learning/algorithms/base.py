@@ -19,9 +19,6 @@ from hyuav.parameters import Parameters, choice, count, number, parameter, seque
 
 learning_rate = number(0.0, 1.0)
 
-UNSATURATED = 2.0
-"""An output before the tanh that still can be turned."""
-
 
 @dataclass(frozen=True)
 class AlgorithmParameters(Parameters, ABC):
@@ -46,10 +43,6 @@ class AlgorithmParameters(Parameters, ABC):
     """In the critics."""
     warm_up_episodes: int = parameter(count(0), 0)
     """Flown at random; see :class:`hyuav.learning.exploration.WarmUp`."""
-    action_stretch: float = parameter(number(1.0, 2.0), 1.0)
-    """Of a deterministic actor's tanh; see :class:`hyuav.learning.networks.StretchedTanh`."""
-    saturation_penalty: float = parameter(number(0.0), 0.0)
-    """Weight of :func:`saturation` in the loss of a deterministic actor."""
     restart_after: int = parameter(count(0), 0)
     """Episodes from which on an actor that is evaluated and found worse than it was goes on from
     its best weights; 0 for never."""
@@ -88,12 +81,6 @@ class AlgorithmParameters(Parameters, ABC):
             )
             bounded.set_keys(value=plain.tensor_keys.value)
             loss.make_value_estimator(bounded)
-
-    def unsaturated(self, actor_loss: Tensor, loss: LossModule, batch: TensorDictBase) -> Tensor:
-        """The actor's loss (N, K), and what :func:`saturation` adds to it."""
-        if not self.saturation_penalty:
-            return actor_loss
-        return actor_loss + self.saturation_penalty * saturation(loss, batch)
 
     def warmed_up(self, explorer: TensorDictModuleBase, learners: int) -> TensorDictModuleBase:
         """What acts in training: the explorer, after the warm-up where there is one."""
@@ -202,24 +189,6 @@ class Algorithm:
     def modules(self) -> nn.ModuleDict:
         """All weights and buffers that training changes."""
         return nn.ModuleDict({"loss": self.loss, "explorer": self.explorer})
-
-
-def saturation(loss: LossModule, batch: TensorDictBase) -> Tensor:
-    """How far a deterministic actor's outputs before the tanh lie beyond :data:`UNSATURATED`.
-
-    There the tanh is flat, and an actor that has gone far does not feel a better action elsewhere.
-
-    Args:
-        loss: with the actor.
-        batch: (N, K) transitions.
-
-    Returns:
-        (N, K) sums of squares over both components.
-    """
-    with loss.actor_network_params.to_module(loss.actor_network):
-        output: Tensor = loss.actor_network.module.before_output(batch["observation"])
-    beyond = output.abs() - UNSATURATED
-    return beyond.clamp(min=0.0).square().sum(dim=-1)
 
 
 def adam(weights: TensorDictParams, learning_rate: float) -> torch.optim.Adam:

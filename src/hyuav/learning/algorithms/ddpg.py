@@ -2,13 +2,18 @@
 
 from dataclasses import dataclass
 
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictSequential
-from torchrl.objectives import DDPGLoss, SoftUpdate
+from torch import Tensor
+from torchrl.objectives import DDPGLoss, LossModule, SoftUpdate
 
 from hyuav.learning.algorithms.base import Algorithm, AlgorithmParameters, GradientStep, adam
 from hyuav.learning.exploration import GaussianNoise
 from hyuav.learning.networks import make_actor, make_critic
 from hyuav.parameters import choice, number, parameter
+
+UNSATURATED = 2.0
+"""An output before the tanh that still can be turned."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +25,10 @@ class DDPG(AlgorithmParameters):
     noise_decay_per: str = parameter(choice("slot", "episode"), "slot")
     noise_floor: float = parameter(number(0.0, 1.0), 0.0)
     """Of the standard deviation."""
+    action_stretch: float = parameter(number(1.0, 2.0), 1.0)
+    """Of the actor's tanh; see :class:`hyuav.learning.networks.StretchedTanh`."""
+    saturation_penalty: float = parameter(number(0.0), 0.0)
+    """Weight of :func:`saturation` in the actor's loss."""
 
     def build(self, learners: int, observation_size: int) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
@@ -65,3 +74,27 @@ class DDPG(AlgorithmParameters):
             self.noise_decay_per,
             self.noise_floor,
         )
+
+    def unsaturated(self, actor_loss: Tensor, loss: LossModule, batch: TensorDictBase) -> Tensor:
+        """The actor's loss (N, K), and what :func:`saturation` adds to it."""
+        if not self.saturation_penalty:
+            return actor_loss
+        return actor_loss + self.saturation_penalty * saturation(loss, batch)
+
+
+def saturation(loss: LossModule, batch: TensorDictBase) -> Tensor:
+    """How far an actor's outputs before the tanh lie beyond :data:`UNSATURATED`.
+
+    There the tanh is flat, and an actor that has gone far does not feel a better action elsewhere.
+
+    Args:
+        loss: with the actor.
+        batch: (N, K) transitions.
+
+    Returns:
+        (N, K) sums of squares over both components.
+    """
+    with loss.actor_network_params.to_module(loss.actor_network):
+        output: Tensor = loss.actor_network.module.before_output(batch["observation"])
+    beyond = output.abs() - UNSATURATED
+    return beyond.clamp(min=0.0).square().sum(dim=-1)
