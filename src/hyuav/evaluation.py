@@ -27,11 +27,11 @@ EVALUATION_FILE, FLIGHTS_FILE = "evaluation.json", "flights.parquet"
 
 LABELS = {
     "proposed": "Proposed",
-    "proposed_paper": "Proposed, paper",
+    "proposed_paper": "Paper Proposed",
     "ja_ot": "Ja-OT",
-    "ja_ot_paper": "Ja-OT, paper",
+    "ja_ot_paper": "Paper Ja-OT",
     "re_ot": "Re-OT",
-    "re_ot_paper": "Re-OT, paper",
+    "re_ot_paper": "Paper Re-OT",
     "re_lt": "Re-LT",
     "ja_lt": "Ja-LT",
     "optimum": "Optimum",
