@@ -1,6 +1,6 @@
-"""Variants with which every learner comes near the optimum, on any layout, scheme and horizon.
+"""Variants whose learners rarely stick, with one setting for any layout, scheme and horizon.
 
-What each piece is for, and what is lost without it, is told in docs/results.md.
+What each piece is for, and how near to the optimum they come, is told in docs/results.md.
 """
 
 from dataclasses import dataclass
