@@ -82,6 +82,8 @@ class Policy:
     """How many it flies, each in one row."""
     clock: bool = False
     """Whether ``observation`` carries the slots flown."""
+    geofence: bool = False
+    """Whether its flights are slowed to end on the map."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +177,14 @@ def fly(
     batch_size = policy.learners, parameters.episodes
     seeds = [derived_seed(parameters.seed, "evaluation")] * policy.learners
     env = make_env(
-        scenario, MODE_RULES[scheme], batch_size, device, seeds, True, clock=policy.clock
+        scenario,
+        MODE_RULES[scheme],
+        batch_size,
+        device,
+        seeds,
+        diagnostics=True,
+        clock=policy.clock,
+        geofence=policy.geofence,
     )
     module = policy.module.to(env.device)
     totals: dict[str, Tensor] = {}

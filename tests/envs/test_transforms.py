@@ -34,6 +34,38 @@ def test_the_specs_hold_with_a_clock(batch_size: tuple[int, ...]) -> None:
     check_env_specs(make_env(TWO_CLUSTERS, batch_size=batch_size, seed=0, clock=True))
 
 
+@given(
+    position=st.tuples(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0)),
+    action=st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)),
+    area=st.sampled_from(["box", "disc"]),
+)
+def test_a_geofence_lets_no_flight_leave_the_map(
+    position: tuple[float, float], action: tuple[float, float], area: str
+) -> None:
+    scenario = dataclasses.replace(TWO_CLUSTERS, speed_limit=area)
+    env = make_env(scenario, "jamming", 1, seed=0, geofence=True)
+    found = fly(env, start_at(env, [list(position)]), list(action))
+    assert not found["off_map"].any()
+    free = torch.tensor(position) + torch.tensor(action) * scenario.max_speed
+    expected = free.clamp(-100.0, 100.0)  # component by component
+    if area == "box":
+        torch.testing.assert_close(found["position"][0], expected, rtol=0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("clock", [False, True])
+def test_the_specs_hold_with_a_geofence(clock: bool) -> None:
+    check_env_specs(make_env(TWO_CLUSTERS, batch_size=(2,), seed=0, clock=clock, geofence=True))
+
+
+def test_what_a_geofence_slows_is_remembered_as_it_was_wanted() -> None:
+    env = make_env(TWO_CLUSTERS, batch_size=(1,), seed=0, geofence=True)
+    state = start_at(env, [[99.0, 0.0]])
+    state["action"] = torch.tensor([[1.0, 0.5]])
+    flown = env.step(state)
+    assert flown["action"].tolist() == [[1.0, 0.5]]
+    torch.testing.assert_close(flown["next", "position"], torch.tensor([[100.0, 10.0]]))
+
+
 @pytest.mark.parametrize("num_slots", [1, 10, 20])
 @pytest.mark.parametrize("batch_size", [(), (3,), (2, 3)])
 def test_an_episode_is_truncated_after_its_slots_and_never_terminates(

@@ -50,6 +50,7 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
         scenario: node positions and parameters, or the name of a preset.
         scheme: "hybrid", "relay" or "jamming".
         clock: append the slots flown to the observation.
+        geofence: slow flights so that they end on the map.
         device: where to compute; observations are NumPy arrays on any device.
         render_mode: "rgb_array" for :meth:`render` to draw the map, or None.
 
@@ -71,12 +72,12 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
         scheme: str = "hybrid",
         *,
         clock: bool = False,
+        geofence: bool = False,
         device: torch.device | str | None = None,
         render_mode: str | None = None,
     ) -> None:
-        env = make_env(
-            scenario, scheme, (), device, int(self.np_random.integers(2**63)), clock=clock
-        )
+        seed = int(self.np_random.integers(2**63))
+        env = make_env(scenario, scheme, (), device, seed, clock=clock, geofence=geofence)
         self._flights = Flights(env, render_mode)
         self.observation_space, self.action_space = self._flights.spaces()
         self.render_mode = render_mode
@@ -126,6 +127,7 @@ class SecureOffloadingVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         scenario: as for :class:`SecureOffloadingGymEnv`, like the following.
         scheme: or one for each row.
         clock: append the slots flown to the observation.
+        geofence: slow flights so that they end on the map.
         device: where to compute.
         render_mode: "rgb_array" for :meth:`render` to draw each row's map, or None.
 
@@ -142,14 +144,14 @@ class SecureOffloadingVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         scheme: str | Sequence[str] = "hybrid",
         *,
         clock: bool = False,
+        geofence: bool = False,
         device: torch.device | str | None = None,
         render_mode: str | None = None,
     ) -> None:
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise InputError(rejection("num_envs", num_envs, "a whole number >= 1"))
-        env = make_env(
-            scenario, scheme, num_envs, device, int(self.np_random.integers(2**63)), clock=clock
-        )
+        seed = int(self.np_random.integers(2**63))
+        env = make_env(scenario, scheme, num_envs, device, seed, clock=clock, geofence=geofence)
         self._flights = Flights(env, render_mode)
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = self._flights.spaces()

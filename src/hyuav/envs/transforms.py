@@ -33,6 +33,31 @@ class OffMapPenalty(Transform):
         return next_tensordict
 
 
+class Geofence(Transform):
+    """Slow the flight, component by component, so that it ends on the map.
+
+    Changes ``action`` (..., 2) on its way to the environment, given ``position`` (..., 2) m. A
+    helper that is sent beyond the edge flies to it or glides along it, where without the fence it
+    would be turned back and pay the penalty.
+
+    Args:
+        scenario: its map, speed limit and slot duration.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__(in_keys_inv=["action"], out_keys_inv=["action"])
+        self._reach = scenario.max_speed * scenario.slot_duration
+        self._edge = scenario.map_side / 2 * (1.0 - 1e-6)  # so that rounding leads nowhere else
+
+    def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Bound the action that the environment takes; the learner's own stays as it is."""
+        position = tensordict["position"]
+        lowest = (-self._edge - position) / self._reach
+        highest = (self._edge - position) / self._reach
+        tensordict["action"] = tensordict["action"].maximum(lowest).minimum(highest)
+        return tensordict
+
+
 class NormalizedObservation(Transform):
     """Gather ``observation`` (U + 5,) and bring each entry to order one by constants alone.
 
@@ -86,6 +111,7 @@ def make_env(
     diagnostics: bool = False,
     *,
     clock: bool = False,
+    geofence: bool = False,
     compiled: bool = False,
 ) -> TransformedEnv:
     """The environment as a learner sees it: :class:`SecureOffloadingEnv` with its transforms.
@@ -103,6 +129,7 @@ def make_env(
         seed: of fading and tasks, one for all or one per row.
         diagnostics: compute the ``diagnostics`` entry too.
         clock: append the slots flown to ``observation``, which then has U + 6 entries.
+        geofence: slow flights so that they end on the map; see :class:`Geofence`.
         compiled: run each slot as one compiled graph, which takes half a minute in the first step
             and pays for batches of thousands that fly thousands of slots.
 
@@ -110,11 +137,13 @@ def make_env(
         InputError: as :class:`SecureOffloadingEnv`.
     """
     switch("clock", clock)
+    switch("geofence", geofence)
     env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics)
     kind = CompiledEnv if switch("compiled", compiled) else TransformedEnv
     return kind(
         env,
         Compose(
+            *([Geofence(env.scenario)] if geofence else []),
             OffMapPenalty(env.scenario.off_map_penalty),
             RewardSum(),
             StepCounter(max_steps=env.scenario.num_slots),
