@@ -168,7 +168,8 @@ def learned_policies(
                 by_scheme.setdefault(schemes[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
             module = LearnedPolicy(scenario, algorithm, weights, indices)
-            policies.setdefault(scheme, []).append(Policy(module, len(indices), algorithm.clock))
+            policy = Policy(module, len(indices), algorithm.clock, algorithm.geofence)
+            policies.setdefault(scheme, []).append(policy)
     if not policies:
         accepted = f"what learners were trained for, {', '.join(map(str, sorted(horizons)))}"
         raise InputError(rejection("num_slots", scenario.num_slots, accepted))

@@ -72,11 +72,11 @@ class Cohort:
         device: torch.device | str | None,
     ) -> None:
         self.scenario, self.learners = scenario, tuple(learners)
-        self.clock = algorithm.clock
+        self._options = {"clock": algorithm.clock, "geofence": algorithm.geofence}
         self.batch_size = batch_size
         seeds = [learner.seed for learner in learners]
         schemes = [learner.scheme for learner in learners]
-        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, clock=self.clock)
+        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, **self._options)
         observation_size = self.env.observation_spec["observation"].shape[-1]
         with self.env.device:
             self.algorithm = algorithm.build(len(seeds), observation_size)
@@ -103,7 +103,7 @@ class Cohort:
     def _random_streams(self, seeds: Sequence[int]) -> dict[str, RowStream]:
         size, normals = self.batch_size, sum(step.normals for step in self.algorithm.steps)
         laws = {
-            "exploration": (standard_normal, (self.algorithm.explorer_normals, 2)),
+            "exploration": (standard_normal, (self.algorithm.parameters.explorer_normals, 2)),
             "sampling": (uniform, (size,)),
             "losses": (standard_normal, (normals, size, 2)),
         }
@@ -151,7 +151,7 @@ class Cohort:
         self.episode += 1
         self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
-        self.algorithm.memory.finish_episode(self.replay, self.scenario.num_slots)
+        self.algorithm.parameters.memory.finish_episode(self.replay, self.scenario.num_slots)
         return flown
 
     def _fly_compiled(self, compiled: CompiledSlots) -> tuple[Tensor, dict[str, Tensor]]:
@@ -173,7 +173,7 @@ class Cohort:
         for _ in range(self.scenario.num_slots):
             transition = next(self._transitions)[:, 0]
             reward += transition["next", "reward"].squeeze(-1)
-            self.replay.extend(self.algorithm.memory.transition(transition).unsqueeze(0))
+            self.replay.extend(self.algorithm.parameters.memory.transition(transition).unsqueeze(0))
             if len(self.replay) >= self.batch_size:
                 losses.append(self._learn())
         return reward, _mean(losses)
@@ -206,7 +206,7 @@ class Cohort:
             (len(self.learners), episodes),
             self.env.device,
             [derived_seed(seed, "evaluation")] * len(self.learners),
-            clock=self.clock,
+            **self._options,
         )
         state, off_map = env.reset(), torch.zeros(len(self.learners), device=env.device)
         for _ in range(self.scenario.num_slots):

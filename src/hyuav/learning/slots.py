@@ -139,7 +139,7 @@ class CompiledSlots:
         system, steps = self._env.base_env.system, self._algorithm.steps
         num_ues, normals = system.scenario.num_ues, sum(step.normals for step in steps)
         shapes: dict[str, tuple[int, ...]] = {
-            "exploration": (learners, self._algorithm.explorer_normals, 2),
+            "exploration": (learners, self._algorithm.parameters.explorer_normals, 2),
             "sampling": (learners, batch_size),
             "corrections": (len(steps), 2),
         }
@@ -156,7 +156,7 @@ class CompiledSlots:
         """What is recorded: one slot of all learners, with its update."""
         given = dict(zip(self._names, inputs, strict=True))
         flown = self._fly_slot(given)
-        self._store(self._algorithm.memory.transition(flown))
+        self._store(self._algorithm.parameters.memory.transition(flown))
         self._go_on(flown)
         normals = given["losses"].unbind(dim=1) if "losses" in given else ()
         with given_normals(iter(normals)):
@@ -181,7 +181,7 @@ class CompiledSlots:
             values.copy_(following[name])
 
     def _store(self, transition: TensorDictBase) -> None:
-        for name in self._algorithm.memory.names:
+        for name in self._algorithm.parameters.memory.names:
             self._storage[name].index_copy_(0, self._cursor, transition[name].unsqueeze(0))
         capacity = self._replay.storage.max_size
         self._cursor.copy_((self._cursor + 1) % capacity)
@@ -190,7 +190,7 @@ class CompiledSlots:
     def _sample(self, uniform: Tensor) -> TensorDictBase:
         slots = sampled_slots(uniform, self._length)
         batch = TensorDict(batch_size=uniform.shape, device=self._env.device)
-        for name in self._algorithm.memory.names:
+        for name in self._algorithm.parameters.memory.names:
             batch[name] = self._storage[name][slots, self._learners]
         return batch
 

@@ -1,14 +1,17 @@
 """DDPG's update against the paper's equations 9 and 10, written out in plain PyTorch."""
 
 import copy
+import math
 
 import pytest
 import torch
 from torch import Tensor, nn
 
 from batches import mini_batch
-from hyuav.learning.algorithms import DDPG, TD3
+from hyuav.learning.algorithms import DDPG, TD3, Algorithm
 from hyuav.learning.algorithms.ddpg import UNSATURATED, saturation
+from hyuav.learning.replay import RETURN
+from hyuav.randomness import given_normals
 
 SIZES = (15, 12, 8, 8, 2)
 
@@ -91,6 +94,7 @@ def test_the_defaults_are_the_papers() -> None:
         "noise_decay_per": "slot",
         # What the paper does not have:
         "clock": False,
+        "geofence": False,
         "finite_horizon": False,
         "reward_scale": 1.0,
         "layer_norm": False,
@@ -99,6 +103,7 @@ def test_the_defaults_are_the_papers() -> None:
         "learning_rate_decay": 1.0,
         "action_stretch": 1.0,
         "saturation_penalty": 0.0,
+        "hovering_weight": 0.0,
         "return_bound": 0.0,
         "return_bound_decay": 1.0,
         "noise_floor": 0.0,
@@ -125,3 +130,64 @@ def test_a_saturated_actor_is_drawn_back(kind: type[DDPG]) -> None:
     for index in range(1, 5):
         algorithm.update_networks(mini_batch(2, 20), index)
     assert bool((bias < 9.0).all())
+
+
+def actor_alone(kind: type[DDPG], hovering_weight: float, slope: float) -> Algorithm:
+    """One learner that flies at half speed along x, and critics for which speed has this slope.
+
+    All of its hidden unit but the first are cut off from the critics, which hold that flying at
+    the speed a along x is worth slope * a, as long as that is small.
+    """
+    algorithm = kind(hidden_sizes=(8,), hovering_weight=hovering_weight).build(1, 15)
+    with torch.no_grad():
+        for name, values in algorithm.loss.state_dict().items():
+            if values.ndim:
+                values.zero_()
+                if "actor" in name and name.endswith("2.bias"):
+                    values[..., 0] = math.atanh(0.5)
+                elif "value" in name and name.endswith("0.weight"):
+                    values[..., 15, 0] = 1e-3  # behind the observation
+                elif "value" in name and name.endswith("2.weight"):
+                    values[..., 0, 0] = 1e3 * slope
+    return algorithm
+
+
+@pytest.mark.parametrize("kind", [DDPG, TD3])
+def test_an_actor_is_held_back_only_where_hovering_is_worth_more(kind: type[DDPG]) -> None:
+    batch = mini_batch(1, 5)
+    for slope, expected in ((-1.0, 0.25), (1.0, 0.0)):
+        hyperparameters = kind(hidden_sizes=(8,), hovering_weight=2.0)
+        algorithm = actor_alone(kind, 2.0, slope)
+        speed = hyperparameters.needless_speed(algorithm.loss, batch)
+        torch.testing.assert_close(speed, torch.full((1, 5), expected))
+        plain = actor_alone(kind, 0.0, slope).steps[1].loss(batch.clone())
+        added = algorithm.steps[1].loss(batch.clone()) - plain
+        torch.testing.assert_close(added, torch.full((1, 5), 2.0 * expected))
+
+
+@pytest.mark.parametrize("kind", [DDPG, TD3])
+def test_the_target_counts_hovering_where_it_is_worth_more(kind: type[DDPG]) -> None:
+    batch = mini_batch(1, 5)
+    batch["observation"].zero_()
+    batch["action"].zero_()  # which the critics hold to be worth nothing
+    batch["next", "reward"].fill_(2.0)
+    for slope, following in ((-4.0, 0.0), (4.0, 2.0)):
+        algorithm = actor_alone(kind, 1.0, slope)
+        with given_normals(iter([torch.zeros(1, 5, 2)])):
+            loss = algorithm.steps[0].loss(batch.clone())
+        critics = 1 + (kind is TD3)
+        expected = critics * (2.0 + 0.95 * following) ** 2
+        torch.testing.assert_close(loss, torch.full((1, 5), expected), rtol=1e-3, atol=0.0)
+
+
+@pytest.mark.parametrize("kind", [DDPG, TD3])
+def test_considering_hovering_leaves_the_targets_without_gradients(kind: type[DDPG]) -> None:
+    torch.manual_seed(0)
+    algorithm = kind(hidden_sizes=(8,), hovering_weight=1.0, return_bound=0.5).build(2, 15)
+    for index in range(1, 5):
+        batch = mini_batch(2, 20)
+        batch[RETURN] = torch.randn(2, 20, 1)
+        algorithm.update_networks(batch, index)
+        algorithm.update_targets(index)
+    for name, values in algorithm.loss.named_buffers():
+        assert not values.requires_grad, name

@@ -14,7 +14,7 @@ from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 from hyuav.learning.exploration import WarmUp
 from hyuav.learning.networks import ACTIVATIONS
 from hyuav.learning.replay import Memory
-from hyuav.learning.targets import BoundedTD0
+from hyuav.learning.targets import RaisedTD0
 from hyuav.parameters import Parameters, choice, count, number, parameter, sequence, switch
 
 learning_rate = number(0.0, 1.0)
@@ -36,6 +36,8 @@ class AlgorithmParameters(Parameters, ABC):
     target_rate: float = parameter(number(0.0, 1.0), 0.005, symbol="tau")
     clock: bool = parameter(switch, False)
     """Observe the slots flown."""
+    geofence: bool = parameter(switch, False)
+    """Slow flights so that they end on the map."""
     finite_horizon: bool = parameter(switch, False)
     """The last slot ends the return: no value is expected beyond it."""
     reward_scale: float = parameter(number(above=0.0), 1.0)
@@ -47,7 +49,7 @@ class AlgorithmParameters(Parameters, ABC):
     """Episodes from which on an actor that is evaluated and found worse than it was goes on from
     its best weights; 0 for never."""
     return_bound: float = parameter(number(0.0, 1.0), 0.0)
-    """Trust in returns above the target; see :class:`hyuav.learning.targets.BoundedTD0`."""
+    """Trust in returns above the target; see :class:`hyuav.learning.targets.RaisedTD0`."""
     return_bound_decay: float = parameter(number(0.0, 1.0), 1.0)
     """Per update."""
 
@@ -67,20 +69,32 @@ class AlgorithmParameters(Parameters, ABC):
             self.discount, self.reward_scale, self.finite_horizon, returns=self.return_bound > 0
         )
 
-    def estimate_values(self, loss: LossModule, learners: int) -> None:
-        """Give a loss its target."""
+    def estimate_values(
+        self,
+        loss: LossModule,
+        learners: int,
+        alternative: Callable[[Tensor], Tensor] | None = None,
+    ) -> None:
+        """Give a loss its target.
+
+        Args:
+            loss: of N learners.
+            learners: N.
+            alternative: see :class:`hyuav.learning.targets.RaisedTD0`.
+        """
         loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
-        if self.return_bound:
+        if self.return_bound or alternative is not None:
             plain = loss.value_estimator
-            bounded = BoundedTD0(
+            raised = RaisedTD0(
                 learners=learners,
+                alternative=alternative,
                 bound=self.return_bound,
                 decay=self.return_bound_decay,
                 gamma=self.discount,
                 value_network=plain.value_network,
             )
-            bounded.set_keys(value=plain.tensor_keys.value)
-            loss.make_value_estimator(bounded)
+            raised.set_keys(value=plain.tensor_keys.value)
+            loss.make_value_estimator(raised)
 
     def warmed_up(self, explorer: TensorDictModuleBase, learners: int) -> TensorDictModuleBase:
         """What acts in training: the explorer, after the warm-up where there is one."""
@@ -112,6 +126,7 @@ class GradientStep:
 class Algorithm:
     """The parts of an algorithm for N learners, ready to train."""
 
+    parameters: AlgorithmParameters
     actor: TensorDictModuleBase
     """mu: writes the noise-free ``action`` (N, ..., 2) from ``observation`` (N, ..., U + 5)."""
     explorer: TensorDictModuleBase
@@ -124,17 +139,10 @@ class Algorithm:
     """theta' <- tau theta + (1 - tau) theta'."""
     target_every: int = 1
     """The targets follow in every n-th update."""
-    memory: Memory = Memory()
-    explorer_normals: int = 1
-    """Standard normal tensors (N, 2) that the explorer draws for each slot."""
-    learning_rate_decay: float = 1.0
-    """Factor of all learning rates after every episode."""
-    restart_after: int = 0
-    """Episodes from which on actors go back to their best weights; 0 for never."""
 
     def learning_rate_factor(self, episode: int) -> float:
         """Of the learning rates in an episode, from 1."""
-        return self.learning_rate_decay ** (episode - 1)
+        return self.parameters.learning_rate_decay ** (episode - 1)
 
     def set_learning_rates(self, episode: int) -> None:
         """Let the optimizers know what episode it is."""
@@ -144,7 +152,7 @@ class Algorithm:
 
     def restarts(self, episode: int) -> bool:
         """Whether actors go back to their best weights after this episode's evaluation."""
-        return 0 < self.restart_after <= episode
+        return 0 < self.parameters.restart_after <= episode
 
     def due(self, index: int) -> tuple[bool, ...]:
         """Which gradient steps the update of this index takes, and last whether targets follow."""

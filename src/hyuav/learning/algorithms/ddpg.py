@@ -1,9 +1,12 @@
 """DDPG as in the paper's Algorithm 1 (Lillicrap et al., ICLR 2016)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
+import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictSequential
+from tensordict.nn import TensorDictParams, TensorDictSequential
 from torch import Tensor
 from torchrl.objectives import DDPGLoss, LossModule, SoftUpdate
 
@@ -29,6 +32,12 @@ class DDPG(AlgorithmParameters):
     """Of the actor's tanh; see :class:`hyuav.learning.networks.StretchedTanh`."""
     saturation_penalty: float = parameter(number(0.0), 0.0)
     """Weight of :func:`saturation` in the actor's loss."""
+    hovering_weight: float = parameter(number(0.0), 0.0)
+    """How strongly the actor is drawn to hover where that is worth more than what it does; with
+    any weight, the critics' target counts whichever is worth more."""
+
+    critic_name: ClassVar[str] = "value_network"
+    """What the loss calls its critic."""
 
     def build(self, learners: int, observation_size: int) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
@@ -43,10 +52,11 @@ class DDPG(AlgorithmParameters):
             delay_value=True,
             reduction="none",
         )
-        self.estimate_values(loss, learners)
+        self.estimate_values(loss, learners, self.alternative(loss))
         critic_optimizer = adam(loss.value_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
+            parameters=self,
             actor=actor,
             explorer=self.warmed_up(TensorDictSequential(actor, self.noise(learners)), learners),
             loss=loss,
@@ -54,15 +64,11 @@ class DDPG(AlgorithmParameters):
                 GradientStep("critic", lambda batch: loss.loss_value(batch)[0], critic_optimizer),
                 GradientStep(
                     "actor",
-                    lambda batch: self.unsaturated(loss.loss_actor(batch)[0], loss, batch),
+                    lambda batch: loss.loss_actor(batch)[0] + self.held_back(loss, batch),
                     actor_optimizer,
                 ),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
-            memory=self.memory,
-            explorer_normals=self.explorer_normals,
-            learning_rate_decay=self.learning_rate_decay,
-            restart_after=self.restart_after,
         )
 
     def noise(self, learners: int) -> GaussianNoise:
@@ -75,11 +81,45 @@ class DDPG(AlgorithmParameters):
             self.noise_floor,
         )
 
-    def unsaturated(self, actor_loss: Tensor, loss: LossModule, batch: TensorDictBase) -> Tensor:
-        """The actor's loss (N, K), and what :func:`saturation` adds to it."""
-        if not self.saturation_penalty:
-            return actor_loss
-        return actor_loss + self.saturation_penalty * saturation(loss, batch)
+    def alternative(self, loss: LossModule) -> Callable[[Tensor], Tensor] | None:
+        """Hovering, where it is considered, as the target critics rate it."""
+        if not self.hovering_weight:
+            return None
+        weights = getattr(loss, f"target_{self.critic_name}_params")
+        return lambda observation: self.rate(
+            loss, weights, observation, torch.zeros_like(observation[..., :2])
+        )
+
+    @torch.no_grad()
+    def rate(
+        self, loss: LossModule, weights: TensorDictParams, observation: Tensor, action: Tensor
+    ) -> Tensor:
+        """What the critics, with these weights, hold of an action: the least of them, (N, K, 1)."""
+        network = getattr(loss, self.critic_name)
+        values = []
+        for own in weights.unbind(0) if weights.batch_dims else (weights,):
+            with own.to_module(network, preserve_module_state=False):
+                values.append(network.module(observation, action))
+        return torch.stack(values).amin(dim=0)
+
+    def held_back(self, loss: LossModule, batch: TensorDictBase) -> Tensor | float:
+        """What is added to the actor's loss against flying too fast: (N, K)."""
+        added: Tensor | float = 0.0
+        if self.saturation_penalty:
+            added = added + self.saturation_penalty * saturation(loss, batch)
+        if self.hovering_weight:
+            added = added + self.hovering_weight * self.needless_speed(loss, batch)
+        return added
+
+    def needless_speed(self, loss: LossModule, batch: TensorDictBase) -> Tensor:
+        """The square of the actor's speed where hovering is worth more, elsewhere 0: (N, K)."""
+        observation = batch["observation"]
+        with loss.actor_network_params.to_module(loss.actor_network):
+            action: Tensor = loss.actor_network.module(observation)
+        weights = getattr(loss, f"{self.critic_name}_params").data
+        chosen = self.rate(loss, weights, observation, action)
+        hovering = self.rate(loss, weights, observation, torch.zeros_like(action))
+        return ((hovering > chosen) * action.square()).sum(dim=-1)
 
 
 def saturation(loss: LossModule, batch: TensorDictBase) -> Tensor:

@@ -21,6 +21,7 @@ class Robust(AlgorithmParameters):
     discount: float = parameter(number(0.0, 1.0), 1.0, symbol="gamma")
     target_rate: float = parameter(number(0.0, 1.0), 0.01, symbol="tau")
     clock: bool = parameter(switch, True)
+    geofence: bool = parameter(switch, True)
     finite_horizon: bool = parameter(switch, True)
     reward_scale: float = parameter(number(above=0.0), 0.05)
     layer_norm: bool = parameter(switch, True)
@@ -40,6 +41,7 @@ class RobustDDPG(Robust, DDPG):
     noise_floor: float = parameter(number(0.0, 1.0), 0.1)
     action_stretch: float = parameter(number(1.0, 2.0), 1.04)
     saturation_penalty: float = parameter(number(0.0), 0.1)
+    hovering_weight: float = parameter(number(0.0), 0.1)
 
 
 @dataclass(frozen=True)

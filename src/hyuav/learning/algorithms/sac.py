@@ -108,6 +108,7 @@ class SAC(AlgorithmParameters):
         )
         mean = TensorDictModule(nn.Tanh(), in_keys=["loc"], out_keys=["action"])
         return Algorithm(
+            parameters=self,
             actor=TensorDictSequential(distribution, mean),
             explorer=self.warmed_up(explorer, learners),
             loss=loss,
@@ -121,8 +122,4 @@ class SAC(AlgorithmParameters):
                 GradientStep("actor", loss.actor_and_temperature_loss, actor_optimizer, normals=1),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
-            memory=self.memory,
-            explorer_normals=self.explorer_normals,
-            learning_rate_decay=self.learning_rate_decay,
-            restart_after=self.restart_after,
         )

@@ -1,6 +1,7 @@
 """TD3: DDPG with twin critics, smoothed targets and a slower actor (Fujimoto et al., ICML 2018)."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from tensordict.nn import TensorDictSequential
 from torchrl.objectives import SoftUpdate, TD3Loss
@@ -19,6 +20,8 @@ class TD3(DDPG):
     target_noise_clip: float = parameter(number(0.0, 2.0), 0.5)
     actor_every: int = parameter(count(), 2)
 
+    critic_name: ClassVar[str] = "qvalue_network"
+
     def build(self, learners: int, observation_size: int) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
         sizes = (learners, observation_size, self.hidden_sizes, self.activation)
@@ -34,10 +37,11 @@ class TD3(DDPG):
             loss_function="l2",
             reduction="none",
         )
-        self.estimate_values(loss, learners)
+        self.estimate_values(loss, learners, self.alternative(loss))
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
+            parameters=self,
             actor=actor,
             explorer=self.warmed_up(TensorDictSequential(actor, self.noise(learners)), learners),
             loss=loss,
@@ -50,15 +54,11 @@ class TD3(DDPG):
                 ),
                 GradientStep(
                     "actor",
-                    lambda batch: self.unsaturated(loss.actor_loss(batch)[0], loss, batch),
+                    lambda batch: loss.actor_loss(batch)[0] + self.held_back(loss, batch),
                     actor_optimizer,
                     every=self.actor_every,
                 ),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
             target_every=self.actor_every,
-            memory=self.memory,
-            explorer_normals=self.explorer_normals,
-            learning_rate_decay=self.learning_rate_decay,
-            restart_after=self.restart_after,
         )
