@@ -21,7 +21,7 @@ from hyuav.comparison.work import work_off
 from hyuav.configuration import Config, recipe, section
 from hyuav.evaluation import EvaluationParameters
 from hyuav.learning.training import TrainingParameters
-from hyuav.tracking import LoggerParameters
+from hyuav.tracking import LoggerParameters, log_comparison
 
 
 @recipe(
@@ -48,6 +48,8 @@ def main(config: Config, directory: Path) -> None:
         summary.save(directory)
         print_tables(summary, options.threshold, console)
         draw(summary, options, directory / "figures")
+        logger = LoggerParameters.from_dict(config["logger"])
+        log_comparison(directory, summary, config, logger, console)
     console.print(f"comparison: {directory}", soft_wrap=True)
     for name, reason in failures.items():
         print(f"failed: {name}: {reason}", file=sys.stderr)

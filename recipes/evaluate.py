@@ -19,6 +19,7 @@ from hyuav.experiment import learned_policies, print_results, reference_policies
 from hyuav.figures import flight_map, save_figure
 from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text
 from hyuav.runs import RunDirectory, require_writable
+from hyuav.tracking import EvaluationLoggerParameters, log_evaluation
 
 
 @dataclass(frozen=True)
@@ -37,13 +38,14 @@ class Evaluate(Parameters):
     "evaluate",
     Evaluate,
     groups={},
-    sections={"evaluation": EvaluationParameters},
+    sections={"evaluation": EvaluationParameters, "logger": EvaluationLoggerParameters},
     run_directory=".",
 )
 def main(config: Config, _: Path) -> None:
     """Evaluate, print the table, and keep it beside the first run's other files."""
     options = section(config, Evaluate)
     parameters = EvaluationParameters.from_dict(config["evaluation"])
+    logger = EvaluationLoggerParameters.from_dict(config["logger"])
     if options.run is None:
         raise InputError("run is missing: expected run=DIRECTORY, or run=[DIRECTORY,...]")
     torch.set_num_threads(options.threads)
@@ -68,6 +70,7 @@ def main(config: Config, _: Path) -> None:
     evaluation.save(output)
     save_figure(flight_map(scenario, evaluation.flights), output / "figures", "flight_map")
     print_results(evaluation, console)
+    log_evaluation(output, evaluation, runs, logger, console)
     console.print(f"evaluation: {output}", soft_wrap=True)
 
 

@@ -2,6 +2,7 @@
 
 python recipes/train.py scenario=two_clusters scheme=hybrid algorithm=ddpg seed=0
 python recipes/train.py scheme=[hybrid,relay,jamming] num_slots=[10,20] learners=10
+python recipes/train.py resume=runs/NAME
 """
 
 from dataclasses import dataclass
@@ -11,11 +12,11 @@ import torch
 from rich.console import Console
 
 from hyuav.configuration import Config, recipe, section
-from hyuav.experiment import saved_weights, train
+from hyuav.experiment import resume, saved_weights, train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import Parameters, choice, count, one_or_more, optional, parameter, text
-from hyuav.runs import RunConfiguration
+from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.system import SCHEMES
 from hyuav.tracking import LoggerParameters
 
@@ -34,6 +35,8 @@ class Train(Parameters):
     device: str = parameter(text, "cpu")
     threads: int = parameter(count(), 1)
     warm_start: str | None = parameter(optional(text), None)
+    resume: str | None = parameter(optional(text), None)
+    """Directory of an interrupted training, with which to go on as it was configured."""
 
 
 @recipe(
@@ -48,6 +51,11 @@ def main(config: Config, directory: Path) -> None:
     """Train, and say where the run is."""
     options = section(config, Train)
     torch.set_num_threads(options.threads)
+    logger, console = LoggerParameters.from_dict(config["logger"]), Console()
+    if options.resume is not None:
+        directory.rmdir()  # which Hydra made for a new training
+        tell(resume(options.resume, logger, console, device=options.device), console)
+        return
     learners = [
         Learner(scheme, options.seed + index, num_slots)
         for scheme in options.scheme
@@ -55,19 +63,24 @@ def main(config: Config, directory: Path) -> None:
         for index in range(options.learners)
     ]
     configuration = RunConfiguration.from_dict({**config, "learners": learners})
-    console = Console()
     run = train(
         directory,
         configuration,
-        LoggerParameters.from_dict(config["logger"]),
+        logger,
         console,
         device=options.device,
         request=config,
         initial_weights=None if options.warm_start is None else saved_weights(options.warm_start),
     )
-    best = run.metrics()["best_evaluation"].dropna().tail(len(learners))
+    tell(run, console)
+
+
+def tell(run: RunDirectory, console: Console) -> None:
+    """Print what a run's learners have reached, and where it is."""
+    learners = len(run.configuration().learners)
+    best = run.metrics()["best_evaluation"].dropna().tail(learners)
     returns = ", ".join(f"{value:.2f}" for value in best)
-    console.print(f"best noise-free accumulated reward (bps/Hz): {returns}")
+    console.print(f"best noise-free accumulated reward (bps/Hz): {returns}", soft_wrap=True)
     console.print(f"run: {run.path}", soft_wrap=True)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import struct
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,19 +29,49 @@ def _records(content: bytes) -> Iterator[bytes]:
             yield parts
 
 
-def logged_history(directory: Path) -> list[dict[str, Any]]:
-    """The history of the one offline run below ``directory``, a record per step."""
-    (file,) = directory.glob("wandb/offline-run-*/*.wandb")
-    history = []
+def offline_runs(directory: Path) -> list[Path]:
+    """The records of the finished offline runs below ``directory``, the oldest first.
+
+    The service of Weights & Biases may write the last of them after the run has been left.
+    """
+    files = directory.glob("wandb/offline-run-*/*.wandb")
+    begun = sorted(files, key=lambda file: file.parent.stat().st_ctime_ns)
+    deadline = time.monotonic() + 60.0
+    while not all(recorded(file, "exit") for file in begun):
+        assert time.monotonic() < deadline, "a run never ended"
+        time.sleep(0.05)
+    return begun
+
+
+def recorded(file: Path, kind: str) -> list[Any]:
+    """All records of one kind in a run's file: "run", "metric", "artifact", "exit" and others."""
+    found = []
     for data in _records(file.read_bytes()):
         record = wandb_internal_pb2.Record()  # type: ignore[attr-defined]
         record.ParseFromString(data)
-        if record.WhichOneof("record_type") == "history":
-            items = record.history.item
-            history.append(
-                {
-                    "/".join(item.nested_key) or item.key: json.loads(item.value_json)
-                    for item in items
-                }
-            )
-    return history
+        if record.WhichOneof("record_type") == kind:
+            found.append(getattr(record, kind))
+    return found
+
+
+def history(file: Path) -> list[dict[str, Any]]:
+    """What a run logged, a record per step."""
+    return [
+        {"/".join(item.nested_key) or item.key: json.loads(item.value_json) for item in each.item}
+        for each in recorded(file, "history")
+    ]
+
+
+def summary(file: Path) -> dict[str, Any]:
+    """What a run's summary came to, by dotted names."""
+    return {
+        ".".join(item.nested_key) or item.key: json.loads(item.value_json)
+        for each in recorded(file, "summary")
+        for item in each.update
+    }
+
+
+def logged_history(directory: Path) -> list[dict[str, Any]]:
+    """The history of the one offline run below ``directory``, a record per step."""
+    (file,) = offline_runs(directory)
+    return history(file)

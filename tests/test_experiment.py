@@ -2,6 +2,7 @@ import dataclasses
 import io
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from rich.console import Console
 
@@ -10,6 +11,7 @@ from hyuav.evaluation import EvaluationParameters, evaluate
 from hyuav.experiment import (
     learned_policies,
     reference_policies,
+    resume,
     saved_weights,
     select_initial_weights,
     train,
@@ -50,6 +52,25 @@ def test_the_best_weights_are_never_worse_than_the_initial_ones(tmp_path: Path) 
     run = train(tmp_path / "run", CONFIGURATION, OFF, SILENT, initial_weights=weights)
     best = run.metrics()["best_evaluation"].dropna().tail(3)
     assert all(after >= before - 0.3 for after, before in zip(best, earned, strict=True))
+
+
+def test_a_resumed_training_brings_what_an_unbroken_one_does(tmp_path: Path) -> None:
+    longer = dataclasses.replace(CONFIGURATION.training, num_episodes=6)
+    unbroken = dataclasses.replace(CONFIGURATION, training=longer)
+    expected = train(tmp_path / "unbroken", unbroken, OFF, SILENT).metrics()
+    run = train(tmp_path / "run", CONFIGURATION, OFF, SILENT)
+    config = run.config_file.read_text()
+    run.config_file.write_text(config.replace("num_episodes: 4", "num_episodes: 6"))
+    metrics = resume(run.path, OFF, SILENT).metrics()
+    pd.testing.assert_frame_equal(
+        metrics.drop(columns="seconds"), expected.drop(columns="seconds"), rtol=1e-4
+    )
+
+
+def test_a_run_without_a_checkpoint_cannot_be_resumed(tmp_path: Path) -> None:
+    run = RunDirectory.create(tmp_path / "run", CONFIGURATION)
+    with pytest.raises(InputError, match=r"checkpoint = .*: expected a checkpoint of kind"):
+        resume(run.path, OFF, SILENT)
 
 
 def test_a_runs_actors_become_the_papers_schemes(tmp_path: Path) -> None:

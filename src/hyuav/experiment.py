@@ -13,7 +13,7 @@ from torch import Tensor
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
 from hyuav.figures import flight_map, learning_curves, save_figure, sum_rate_maps
-from hyuav.learning.checkpoint import load_weights_file
+from hyuav.learning.checkpoint import load_checkpoint, load_weights_file
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training
 from hyuav.learning.weights import count_learners, join_learners, select_learner
@@ -22,7 +22,7 @@ from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
 from hyuav.schemes.linear import ConstantVelocity, ja_lt, re_lt
 from hyuav.schemes.optimum import FlightPolicy, solve
-from hyuav.terminal import results_table
+from hyuav.terminal import print_table, results_table
 from hyuav.tracking import LoggerParameters, Tracker
 
 LEARNED = {"hybrid": "proposed", "relay": "re_ot", "jamming": "ja_ot"}
@@ -43,6 +43,7 @@ def train(
     device: str | None = None,
     initial_weights: dict[str, Tensor] | None = None,
     request: Mapping[str, Any] | None = None,
+    logs: Path | None = None,
 ) -> RunDirectory:
     """Train as configured, reporting to a new run directory.
 
@@ -54,24 +55,57 @@ def train(
         device: to train on.
         initial_weights: to begin with, instead of fresh ones.
         request: all that was asked for, to be kept with the run.
+        logs: directory for the files of Weights & Biases; the run's where it is None.
 
     Raises:
         InputError: the directory is taken, or the checkpoint does not fit.
     """
-    training = Training(
+    training = _training(configuration, device)
+    if initial_weights is not None:
+        training.warm_start(initial_weights)
+    run = RunDirectory.create(directory, configuration, request)
+    with Tracker(run, configuration, training, logger, console, logs) as tracker:
+        for episode in training.episodes():
+            tracker.log(episode)
+    return run
+
+
+def resume(
+    directory: str | Path,
+    logger: LoggerParameters,
+    console: Console,
+    *,
+    device: str | None = None,
+) -> RunDirectory:
+    """Go on with a training from its last checkpoint, in its directory and its W&B run.
+
+    Args:
+        directory: of the run.
+        logger: what Weights & Biases gets.
+        console: to show progress on.
+        device: to train on.
+
+    Raises:
+        InputError: there is no such run, or no checkpoint of it.
+    """
+    run = RunDirectory(directory)
+    configuration = run.configuration()
+    training = _training(configuration, device)
+    training.load_state_dict(load_checkpoint(run.last_checkpoint, "training"))
+    with Tracker(run, configuration, training, logger, console) as tracker:
+        for episode in training.episodes():
+            tracker.log(episode)
+    return run
+
+
+def _training(configuration: RunConfiguration, device: str | None) -> Training:
+    return Training(
         configuration.scenario,
         configuration.learners,
         configuration.algorithm,
         configuration.training,
         device,
     )
-    if initial_weights is not None:
-        training.warm_start(initial_weights)
-    run = RunDirectory.create(directory, configuration, request)
-    with Tracker(run, configuration, training, logger, console) as tracker:
-        for episode in training.episodes():
-            tracker.log(episode)
-    return run
 
 
 def saved_weights(path: str | Path) -> dict[str, Tensor]:
@@ -227,7 +261,7 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
             _percent(result["offloading_share"]),
             f"{result['off_map']:.1f}",
         )
-    console.print(table)
+    print_table(table, console)
     for scheme, result in summary["schemes"].items():
         if result["budget_violations"] > 0:
             count = f"{result['budget_violations']:.2f}"

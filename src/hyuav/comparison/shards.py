@@ -1,5 +1,6 @@
 """A comparison's pieces of work, each kept in a directory of its own once it is done."""
 
+import dataclasses
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from hyuav.comparison.plan import PEER, training_episodes
 from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
 from hyuav.experiment import LEARNED, learned_policies, train
 from hyuav.runs import RunConfiguration
-from hyuav.tracking import LoggerParameters
+from hyuav.tracking import LoggerParameters, in_group
 
 RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
 
@@ -75,7 +76,11 @@ class Shard:
 def _train(shard: Shard, directory: Path) -> tuple[pd.DataFrame, list[float]]:
     """The evaluations of a training by this project, and the best actors' sum-rates in bps/Hz."""
     configuration, scenario = shard.configuration, shard.configuration.scenario
-    run = train(directory, configuration, shard.logger, Console(quiet=True))
+    logger = dataclasses.replace(
+        in_group(shard.logger, shard.parent.parent), name=shard.name, id=None
+    )
+    logs = shard.parent.parent  # which does not change its name
+    run = train(directory, configuration, logger, Console(quiet=True), logs=logs)
     metrics = run.metrics().dropna(subset="evaluation")
     metrics["seconds"] /= len(configuration.learners)
     earned: dict[str, list[float]] = {

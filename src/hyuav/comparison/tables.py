@@ -11,7 +11,7 @@ from rich.table import Table
 from hyuav.comparison.directory import Summary
 from hyuav.comparison.plan import PEER
 from hyuav.comparison.statistics import NEAR_OPTIMAL
-from hyuav.terminal import results_table
+from hyuav.terminal import print_table, results_table
 
 
 def label(entry: str) -> str:
@@ -36,12 +36,12 @@ def print_tables(summary: Summary, threshold: float, console: Console) -> None:
     for (scenario, num_slots), cells in summary.cells.groupby(
         ["scenario", "num_slots"], sort=False
     ):
-        console.print(_cells(f"{scenario}, T = {num_slots}", cells, threshold))
-    console.print(_algorithms("All cells", summary.algorithms, threshold))
+        print_table(_cells(f"{scenario}, T = {num_slots}", cells, threshold), console)
+    print_table(_algorithms("All cells", summary.algorithms, threshold), console)
     if len(summary.layouts) and summary.cells["scenario"].nunique() > 1:
-        console.print(_algorithms("Random layouts", summary.layouts, threshold))
+        print_table(_algorithms("Random layouts", summary.layouts, threshold), console)
     if len(summary.improvements):
-        console.print(_improvements(summary.improvements))
+        print_table(_improvements(summary.improvements), console)
 
 
 def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:

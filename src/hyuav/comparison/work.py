@@ -1,12 +1,12 @@
 """Doing what is left of a comparison, and telling how far it is."""
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hyuav.comparison.directory import ComparisonDirectory
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.processes import Workers
 from hyuav.comparison.shards import Shard
+from hyuav.terminal import make_progress
 
 
 def work_off(comparison: ComparisonDirectory, console: Console) -> dict[str, str]:
@@ -20,14 +20,7 @@ def work_off(comparison: ComparisonDirectory, console: Console) -> dict[str, str
         the reason for each failure, by what failed.
     """
     failures: dict[str, str] = {}
-    progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    )
+    progress = make_progress(console, "{task.description}")
     with progress, Workers(comparison.options.workers) as workers:
         unsolved = [own for own in comparison.optima.values() if not own.file.exists()]
         task = progress.add_task("optima", total=len(unsolved))

@@ -1,0 +1,17 @@
+"""Where a training reports to: its run directory, Weights & Biases and the terminal."""
+
+from hyuav.tracking.parameters import EvaluationLoggerParameters, LoggerParameters
+from hyuav.tracking.reports import in_group, log_comparison, log_evaluation
+from hyuav.tracking.session import Session
+from hyuav.tracking.tracker import Tracker, learner_names
+
+__all__ = [
+    "EvaluationLoggerParameters",
+    "LoggerParameters",
+    "Session",
+    "Tracker",
+    "in_group",
+    "learner_names",
+    "log_comparison",
+    "log_evaluation",
+]
