@@ -3,11 +3,14 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
+FIGURES := also=random_disk
+QUICK := seeds=2 num_slots=[10,15,20] training.num_episodes=120 candidates=2 \
+	candidate_episodes=20 evaluation.episodes=200 evaluation.resolution=2
 
-.PHONY: help setup reproduce test test-slow lint format clean
+.PHONY: help setup reproduce figures figures-quick test test-slow lint format clean
 
 help: ## list the commands
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
 
 setup: $(VENV)/.ready ## create .venv with the pinned dependencies
 
@@ -18,6 +21,12 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 
 reproduce: setup ## train Proposed, Re-OT and Ja-OT, evaluate them, draw the figures
 	$(BIN)/python recipes/reproduce.py $(ARGS)
+
+figures: setup ## draw all figures of the paper: 10 seeds, N = 10 to 20, both layouts
+	$(BIN)/python recipes/reproduce.py $(FIGURES) seeds=10 num_slots=[10,12,14,16,18,20] $(ARGS)
+
+figures-quick: setup ## the same within 5 minutes: 2 seeds, N = 10, 15, 20, short trainings
+	$(BIN)/python recipes/reproduce.py $(FIGURES) $(QUICK) $(ARGS)
 
 test: setup ## run the tests
 	$(BIN)/python -m pytest --numprocesses 2 $(ARGS)

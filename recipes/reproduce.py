@@ -1,12 +1,15 @@
-"""The main job: train Proposed, Re-OT and Ja-OT, and set them beside the references.
+"""The main job: train Proposed, Re-OT and Ja-OT, set them beside the references, draw.
 
 They are trained twice: by the robust variant of DDPG, and exactly as in the paper.
 
 python recipes/reproduce.py
 python recipes/reproduce.py scenario=random_disk training.num_episodes=600
+python recipes/reproduce.py seeds=10 num_slots=[10,12,14,16,18,20] also=random_disk
+python recipes/reproduce.py figures=[learning_curves,trajectories]
 """
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,22 +18,24 @@ from rich.console import Console
 from torch import Tensor
 
 from hyuav.configuration import Config, recipe, section
-from hyuav.evaluation import EvaluationParameters, evaluate
+from hyuav.errors import InputError, rejection
+from hyuav.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
 from hyuav.experiment import (
-    LEARNED,
     LEARNED_AS_IN_PAPER,
-    draw_figures,
     learned_policies,
     print_results,
     reference_policies,
     select_initial_weights,
     train,
 )
+from hyuav.figures.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
 from hyuav.learning.algorithms import DDPG
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import Parameters, count, parameter, text
-from hyuav.runs import RunConfiguration
+from hyuav.parameters import Parameters, choice, count, one_or_more, optional, parameter, text
+from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.scenario import PRESETS, Scenario
+from hyuav.schemes.optimum import require_resolution
 from hyuav.system import SCHEMES
 from hyuav.tracking import LoggerParameters
 
@@ -40,6 +45,18 @@ class Reproduce(Parameters):
     """How the main job is done."""
 
     seeds: int = parameter(count(), 1)
+    num_slots: tuple[int, ...] | None = parameter(
+        optional(one_or_more(count(), "numbers of slots")), None, symbol="T"
+    )
+    """Horizons to train and evaluate besides the scenario's own, as for Fig. 4."""
+    also: tuple[str, ...] | None = parameter(
+        optional(one_or_more(choice(*PRESETS), f"a list of {', '.join(PRESETS)}")), None
+    )
+    """Presets whose UEs are flown over too, all else being as in the scenario, as for Fig. 3."""
+    figures: tuple[str, ...] | None = parameter(
+        optional(one_or_more(choice(*FIGURES), f"a list of {', '.join(FIGURES)}")), None
+    )
+    """To draw; None for all that these settings allow."""
     candidates: int = parameter(count(), 5)
     """Of each scheme's initial weights, where it is trained as in the paper."""
     candidate_episodes: int = parameter(count(), 50)
@@ -63,43 +80,121 @@ def main(config: Config, directory: Path) -> None:
     """Train the three learned schemes side by side, evaluate them all, draw the figures."""
     options = section(config, Reproduce)
     torch.set_num_threads(options.threads)
-    parameters = EvaluationParameters.from_dict(config["evaluation"])
-    logger = LoggerParameters.from_dict(config["logger"])
+    work = Work(
+        EvaluationParameters.from_dict(config["evaluation"]),
+        LoggerParameters.from_dict(config["logger"]),
+        options.device,
+        config,
+        Console(),
+    )
     seeds = range(options.seed, options.seed + options.seeds)
     learners = [Learner(scheme, seed) for scheme in SCHEMES for seed in seeds]
-    configuration = RunConfiguration.from_dict({**config, "learners": learners})
-    scenario = configuration.scenario
-    console = Console()
-    references = reference_policies(scenario, parameters.resolution, console)
-    as_in_paper = dataclasses.replace(configuration, algorithm_name="ddpg", algorithm=DDPG())
-    run, paper_run = (
-        train(
-            path,
-            own,
-            logger,
-            console,
-            device=options.device,
-            initial_weights=weights,
-            request=config,
-        )
-        for path, own, weights in (
-            (directory, configuration, None),
-            (directory / "as_in_paper", as_in_paper, _candidates(as_in_paper, options, console)),
-        )
-    )
-    policies = {
-        **learned_policies([run], scenario),
-        **learned_policies([paper_run], scenario, LEARNED_AS_IN_PAPER),
-        **references,
-    }
-    evaluation = evaluate(
-        scenario, configuration.scenario_name, policies, parameters, options.device
-    )
-    evaluation.save(run.path)
-    trained = [(run, LEARNED), (paper_run, LEARNED_AS_IN_PAPER)]
-    draw_figures(run.figures, scenario, evaluation, trained)
-    print_results(evaluation, console)
+    own = RunConfiguration.from_dict({**config, "learners": learners})
+    scenario, console = own.scenario, work.console
+    others = _other_horizons(scenario, options)
+    longest = max([scenario.num_slots, *others])
+    require_resolution(work.evaluation.resolution, scenario.map_side, longest)
+    further = _on_further_presets(own, options)
+
+    run = work.train(directory, _over_horizons(own, (scenario.num_slots, *others)))
+    as_in_paper = dataclasses.replace(own, algorithm_name="ddpg", algorithm=DDPG())
+    weights = _candidates(as_in_paper, options, console)
+    paper_run = work.train(directory / AS_IN_PAPER, as_in_paper, weights)
+    paper = learned_policies([paper_run], scenario, LEARNED_AS_IN_PAPER)
+    evaluations = [work.evaluate(run, scenario, run.path, paper)]
+    for num_slots in others:
+        over = dataclasses.replace(scenario, num_slots=num_slots)
+        work.evaluate(run, over, horizon_directory(run, num_slots))
+    for configuration in further:
+        beside = work.train(directory / configuration.scenario_name, configuration)
+        evaluations.append(work.evaluate(beside, configuration.scenario, beside.path))
+    draw(run, options.figures, console)
+    for evaluation in evaluations:
+        print_results(evaluation, console)
     console.print(f"figures: {run.figures}", soft_wrap=True)
+
+
+@dataclass(frozen=True)
+class Work:
+    """What all trainings and evaluations of the job share."""
+
+    evaluation: EvaluationParameters
+    logger: LoggerParameters
+    device: str
+    request: Config
+    console: Console
+
+    def train(
+        self,
+        path: Path,
+        configuration: RunConfiguration,
+        initial_weights: dict[str, Tensor] | None = None,
+    ) -> RunDirectory:
+        """Train into a new run directory."""
+        return train(
+            path,
+            configuration,
+            self.logger,
+            self.console,
+            device=self.device,
+            initial_weights=initial_weights,
+            request=self.request,
+        )
+
+    def evaluate(
+        self,
+        run: RunDirectory,
+        scenario: Scenario,
+        directory: Path,
+        beside: Mapping[str, list[Policy]] | None = None,
+    ) -> Evaluation:
+        """Fly a run's actors, what stands beside them and the references; keep what came of it."""
+        policies = {
+            **learned_policies([run], scenario),
+            **(beside or {}),
+            **reference_policies(scenario, self.evaluation.resolution, self.console),
+        }
+        name = run.configuration().scenario_name
+        evaluation = evaluate(scenario, name, policies, self.evaluation, self.device)
+        evaluation.save(directory)
+        return evaluation
+
+
+def _other_horizons(scenario: Scenario, options: Reproduce) -> list[int]:
+    """The horizons besides the scenario's own."""
+    asked = dict.fromkeys(options.num_slots or ())
+    others = [num_slots for num_slots in asked if num_slots != scenario.num_slots]
+    if "horizons" in (options.figures or ()) and not others:
+        accepted = f"horizons besides the scenario's {scenario.num_slots}, for the figure horizons"
+        raise InputError(rejection("num_slots", options.num_slots, accepted))
+    return others
+
+
+def _over_horizons(own: RunConfiguration, horizons: Sequence[int]) -> RunConfiguration:
+    """The same with its learners over each horizon."""
+    learners = tuple(
+        dataclasses.replace(learner, num_slots=num_slots)
+        for num_slots in horizons
+        for learner in own.learners
+    )
+    return dataclasses.replace(own, learners=learners)
+
+
+def _on_further_presets(own: RunConfiguration, options: Reproduce) -> list[RunConfiguration]:
+    """The same where the UEs are at a preset's places."""
+    presets = options.also or ()
+    for index, name in enumerate(presets):
+        if name in (own.scenario_name, *presets[:index]):
+            accepted = "presets that differ from each other and from the scenario"
+            raise InputError(rejection(f"also[{index}]", name, accepted))
+    return [
+        dataclasses.replace(
+            own,
+            scenario_name=name,
+            scenario=dataclasses.replace(own.scenario, ue_positions=PRESETS[name]),
+        )
+        for name in presets
+    ]
 
 
 def _candidates(

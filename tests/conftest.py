@@ -1,5 +1,6 @@
 """Shared by all tests: one thread, reproducible property tests, environments and recipes."""
 
+import dataclasses
 import importlib.util
 import sys
 from collections.abc import Callable, Iterator
@@ -12,6 +13,10 @@ import torch
 from hypothesis import settings
 
 import hyuav  # noqa: F401 - registers the environments
+from hyuav import Scenario
+from hyuav.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.schemes.linear import ja_lt, re_lt
+from hyuav.schemes.optimum import FlightPolicy, solve
 
 RECIPES = Path(__file__).parents[1] / "recipes"
 
@@ -46,6 +51,28 @@ def make_vec() -> Callable[..., Any]:
 def build(request: pytest.FixtureRequest) -> Any:
     """Either of both."""
     return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(scope="session")
+def scenario() -> Scenario:
+    """That of ``evaluation``."""
+    return dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
+
+
+@pytest.fixture(scope="session")
+def evaluation(scenario: Scenario) -> Evaluation:
+    """The straight flights and the optima; the hybrid optimum is flown as Proposed too."""
+    optima = solve(scenario, resolution=5.0)
+    best = {rule: [Policy(FlightPolicy(found.path, scenario))] for rule, found in optima.items()}
+    policies = {
+        "re_lt": [Policy(re_lt(scenario))],
+        "ja_lt": [Policy(ja_lt(scenario))],
+        "proposed": best["hybrid"],
+        "optimum": best["hybrid"],
+        "re_optimum": best["relay"],
+        "ja_optimum": best["jamming"],
+    }
+    return evaluate(scenario, "x", policies, EvaluationParameters(episodes=20, flights=2))
 
 
 @pytest.fixture

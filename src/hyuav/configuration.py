@@ -95,6 +95,9 @@ def recipe(
                 _remove_if_empty(directory)
                 _refuse(str(error))  # here, before Hydra adds lines of its own
 
+        # Or Hydra would take this package's folders for groups: hyuav/figures for ``figures=...``.
+        run.__module__ = "__main__"
+
         def command() -> None:
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)

@@ -1,18 +1,16 @@
-"""What the recipes do: train into a run directory, gather the schemes, evaluate, draw."""
+"""What the recipes do: train into a run directory, gather the schemes, tell what came of it."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import torch
 from rich.console import Console
 from torch import Tensor
 
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
-from hyuav.figures import flight_map, learning_curves, save_figure, sum_rate_maps
 from hyuav.learning.checkpoint import load_checkpoint, load_weights_file
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training
@@ -270,31 +268,3 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
 
 def _percent(fraction: float | None) -> str:
     return "-" if fraction is None else f"{100 * fraction:.1f} %"
-
-
-def draw_figures(
-    directory: Path,
-    scenario: Scenario,
-    evaluation: Evaluation,
-    runs: Sequence[tuple[RunDirectory, Mapping[str, str]]],
-) -> None:
-    """Write the learning curves, the flight map and the maps of the secrecy sum-rate.
-
-    Args:
-        directory: for the PNG and PDF files.
-        scenario: that was flown.
-        evaluation: whose flights are drawn and whose optima bound the curves.
-        runs: whose learning is drawn, with the schemes that their learners count as.
-    """
-    results = evaluation.summary["schemes"]
-    curves: dict[str, pd.DataFrame] = {}
-    optima: dict[str, float] = {}
-    for run, schemes in runs:
-        for rule, rows in run.metrics().groupby("scheme"):
-            name = schemes[str(rule)]
-            curves[name] = rows.pivot_table("accumulated_reward", "episode", "learner")
-            optima[name] = results[OPTIMA[str(rule)]]["secrecy_sum_rate"]["mean"]
-    in_order = {name: curves[name] for name in LABELS if name in curves}
-    save_figure(learning_curves(in_order, optima), directory, "learning_curves")
-    save_figure(flight_map(scenario, evaluation.flights), directory, "flight_map")
-    save_figure(sum_rate_maps(scenario), directory, "sum_rate_maps")

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import warnings
 
 import numpy as np
 import pandas as pd
@@ -10,17 +9,15 @@ import pytest
 
 from hyuav.comparison.statistics import (
     LAYOUTS,
-    Array,
     improvements,
     in_cells,
-    interquartile_mean,
     learning_curves,
     performance_profiles,
     probability_of_improvement,
-    stratified_interval,
     summarize_algorithms,
     summarize_cells,
 )
+from hyuav.intervals import Array
 
 
 def learners(algorithm: str, fractions: list[float], scenario: str = "random_disk") -> pd.DataFrame:
@@ -45,12 +42,6 @@ def normal(*shape: int) -> Array:
     return np.random.default_rng(0).standard_normal(shape)
 
 
-def test_the_interquartile_mean_leaves_out_the_outer_quarters() -> None:
-    assert interquartile_mean([np.arange(8.0)]) == (2 + 3 + 4 + 5) / 4
-    assert interquartile_mean([np.arange(10.0)]) == (2 + 3 + 4 + 5 + 6 + 7) / 6
-    assert interquartile_mean([np.array([0.0, 1.0]), np.array([2.0, 99.0])]) == 1.5
-
-
 def test_the_probability_of_improvement_counts_pairs() -> None:
     ones, low, high = np.ones(3), np.array([1.0, 2.0]), np.array([3.0, 4.0, 5.0])
     assert probability_of_improvement(high, low) == 1.0
@@ -59,41 +50,6 @@ def test_the_probability_of_improvement_counts_pairs() -> None:
     x, y = normal(20).round(1), normal(2, 30)[1].round(1)
     counted = [float(a > b) + 0.5 * (a == b) for a, b in itertools.product(x, y)]
     assert probability_of_improvement(x, y) == pytest.approx(np.mean(counted))
-
-
-def test_an_interval_covers_the_value_as_often_as_it_says() -> None:
-    draws = normal(200, 30)
-    intervals = [stratified_interval([sample], interquartile_mean) for sample in draws]
-    assert 0.88 <= np.mean([low <= 0.0 <= high for low, high in intervals]) <= 0.99
-
-
-def test_an_interval_is_that_of_resamples_drawn_by_hand() -> None:
-    sample, rng = normal(40), np.random.default_rng(1)
-    means = sample[rng.integers(40, size=(20_000, 40))].mean(axis=1)
-    expected = np.quantile(means, (0.025, 0.975))
-    low, high = stratified_interval([sample], lambda drawn: np.concatenate(drawn, axis=-1).mean(-1))
-    np.testing.assert_allclose((low, high), expected, atol=0.02)
-
-
-def test_the_cells_are_kept_apart() -> None:
-    """Cells that differ among, but not within, themselves leave nothing to chance."""
-    low, high = stratified_interval([np.zeros(5), np.ones(5)], interquartile_mean)
-    assert low == high == 0.5
-
-
-@pytest.mark.parametrize("samples", [[0.5], [0.5, 0.5, 0.5]])
-def test_samples_that_do_not_vary_are_their_own_interval(samples: list[float]) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        low, high = stratified_interval([np.array(samples)], interquartile_mean)
-    assert low == high == 0.5
-
-
-def test_a_cell_of_one_learner_has_the_weight_of_one() -> None:
-    low, high = stratified_interval([np.array([1.0]), np.zeros(3)], interquartile_mean)
-    assert low == high == 0.0
-    mean = interquartile_mean([np.array([1.0]), np.zeros(3)])
-    assert mean == 0.0
 
 
 def test_a_cell_is_summarized() -> None:

@@ -1,4 +1,4 @@
-"""The main job at its full length."""
+"""The main job: over several layouts and horizons, and at its full length."""
 
 import json
 from collections.abc import Callable
@@ -6,6 +6,74 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+
+from hyuav.figures.gallery import FIGURES
+from hyuav.runs import RunDirectory
+from hyuav.scenario import PRESETS
+
+TINY = [
+    "training.num_episodes=4",
+    "training.batch_size=8",
+    "training.evaluation_every=2",
+    "training.evaluation_episodes=3",
+    "algorithm.hidden_sizes=[8]",
+    "candidates=1",
+    "evaluation.episodes=4",
+    "evaluation.resolution=5",
+    "scenario.num_slots=8",
+    "logger.mode=disabled",
+    "hydra.run.dir=job",
+]
+
+
+def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
+    call: Callable[..., None], tmp_path: Path
+) -> None:
+    call("reproduce", "seeds=2", "num_slots=[8,10]", "also=random_disk", *TINY)
+    job = tmp_path / "job"
+    learners = RunDirectory(job).configuration().learners
+    assert [own.num_slots for own in learners] == [8] * 6 + [10] * 6
+    files = {path.name for path in (job / "figures").iterdir()}
+    prints = {f"{name}.{suffix}" for name in FIGURES for suffix in ("pdf", "png", "csv")}
+    assert files == prints - {"animation.pdf", "animation.png"} | {
+        *("animation.gif", "trajectories_nodes.csv", "flight_map_nodes.csv")
+    }
+    horizons = pd.read_csv(job / "figures" / "horizons.csv")
+    assert horizons.groupby("num_slots")["scheme"].count().to_dict() == {8: 8, 10: 8}
+    assert set(horizons[horizons["scheme"] == "proposed"]["learners"]) == {2}
+    beside = RunDirectory(job / "random_disk")
+    configuration = beside.configuration()
+    assert configuration.scenario.ue_positions == PRESETS["random_disk"]
+    assert configuration.scenario.num_slots == 8
+    assert (beside.figures / "trajectories.pdf").exists()
+    paper = RunDirectory(job / "as_in_paper").metrics()
+    assert len(paper) == 4 * 6
+    assert set(paper["num_slots"]) == {8}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["figures=[horizons]"], "num_slots = None: expected horizons besides the scenario's 8"),
+        (["figures=horizons", "num_slots=8"], "num_slots = (8,): expected horizons besides"),
+        (["also=two_clusters"], "also[0] = 'two_clusters': expected presets that differ"),
+        (["also=[random_disk,random_disk]"], "also[1] = 'random_disk': expected presets that"),
+        (["also=../elsewhere"], "also = '../elsewhere': expected one of random_disk, two_clusters"),
+        (["figures=[fig4]"], "figures[0] = 'fig4': expected one of learning_curves"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_before_any_training(
+    call: Callable[..., None],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    line: str,
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        call("reproduce", *arguments, *TINY)
+    assert stopped.value.code == 2
+    assert line in capsys.readouterr().err
+    assert not (tmp_path / "job").exists()
 
 
 @pytest.mark.slow

@@ -8,26 +8,18 @@ percentile intervals of a bootstrap that draws the learners of each cell anew.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+from numpy.typing import ArrayLike
 
 from hyuav.comparison.plan import LAYOUT
-
-Array = NDArray[np.float64]
-Statistic = Callable[[Sequence[Array]], Any]
-"""Takes samples (..., n) of each cell, returns (...)."""
+from hyuav.intervals import Array, interquartile_mean, stratified_interval
 
 LAYOUTS = "layouts"
 """The scenario of the cells that hold the random layouts."""
-
-RESAMPLES, RESAMPLES_AT_ONCE = 2000, 100
-SEED = 0
-"""Of the bootstrap, so that the same results have the same intervals."""
 
 NEAR_OPTIMAL = 0.95
 """Share of the optimum that is counted beside the threshold."""
@@ -41,11 +33,6 @@ def in_cells(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.assign(scenario=rows["scenario"].mask(drawn, LAYOUTS))
 
 
-def interquartile_mean(samples: Sequence[Array]) -> Any:
-    """Mean of the middle half of all samples together."""
-    return stats.trim_mean(np.concatenate(samples, axis=-1), 0.25, axis=-1)
-
-
 def share(samples: Sequence[Array]) -> Any:
     """Mean of all samples together."""
     return np.concatenate(samples, axis=-1).mean(axis=-1)
@@ -55,36 +42,6 @@ def probability_of_improvement(x: Array, y: Array) -> Any:
     """P(X > Y) + P(X = Y) / 2 of samples (..., n) and (..., m): (...)."""
     one, other = x[..., :, np.newaxis], y[..., np.newaxis, :]
     return ((one > other) + 0.5 * (one == other)).mean(axis=(-1, -2))
-
-
-def stratified_interval(samples: Sequence[Array], statistic: Statistic) -> tuple[Any, Any]:
-    """The 95 % interval of a statistic, each cell's samples being drawn anew from that cell.
-
-    Args:
-        samples: (..., n) of each cell; one sample alone is always drawn again.
-        statistic: of all cells.
-
-    Returns:
-        the lower and the upper bound (...).
-    """
-    sizes = [own.shape[-1] for own in samples]
-    # SciPy wants two samples at least: one alone is given twice, and the second is left out.
-    given = [np.concatenate([own, own], axis=-1) if own.shape[-1] == 1 else own for own in samples]
-
-    def of_drawn(*drawn: Array, axis: int) -> Any:  # noqa: ARG001 - SciPy's last one
-        return statistic([own[..., :size] for own, size in zip(drawn, sizes, strict=True)])
-
-    interval = stats.bootstrap(
-        given,
-        of_drawn,
-        axis=-1,
-        n_resamples=RESAMPLES,
-        batch=RESAMPLES_AT_ONCE,
-        vectorized=True,
-        method="percentile",
-        rng=np.random.default_rng(SEED),
-    ).confidence_interval
-    return interval.low, interval.high
 
 
 def summarize_cells(results: pd.DataFrame, threshold: float) -> pd.DataFrame:

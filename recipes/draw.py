@@ -1,0 +1,47 @@
+"""Draw the figures of a finished run again, from its files alone.
+
+python recipes/draw.py run=runs/NAME
+python recipes/draw.py run=runs/NAME figures=[trajectories,animation]
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+from hyuav.configuration import Config, recipe, section
+from hyuav.errors import InputError
+from hyuav.figures.gallery import FIGURES, draw
+from hyuav.parameters import Parameters, choice, one_or_more, optional, parameter, text
+from hyuav.runs import RunDirectory, require_writable
+
+
+@dataclass(frozen=True)
+class Draw(Parameters):
+    """Which figures of which run."""
+
+    run: str | None = parameter(optional(text), None)
+    figures: tuple[str, ...] | None = parameter(
+        optional(one_or_more(choice(*FIGURES), f"a list of {', '.join(FIGURES)}")), None
+    )
+    """None for all that the run's files allow."""
+
+
+@recipe("draw", Draw, groups={}, sections={}, run_directory=".")
+def main(config: Config, _: Path) -> None:
+    """Draw, and say where the figures are."""
+    options = section(config, Draw)
+    if options.run is None:
+        raise InputError("run is missing: expected run=DIRECTORY")
+    torch.set_num_threads(1)
+    run = RunDirectory(options.run)
+    run.configuration()  # before a directory for figures is made where there is no run
+    require_writable("run", run.figures)
+    console = Console()
+    draw(run, options.figures, console)
+    console.print(f"figures: {run.figures}", soft_wrap=True)
+
+
+if __name__ == "__main__":
+    main()

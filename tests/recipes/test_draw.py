@@ -1,0 +1,60 @@
+"""Figures of a finished run, drawn again as a user asks for them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Call = Callable[..., None]
+
+TINY = [
+    "training.num_episodes=2",
+    "training.batch_size=8",
+    "training.evaluation_episodes=3",
+    "algorithm.hidden_sizes=[8]",
+    "logger.mode=disabled",
+    "hydra.run.dir=run",
+]
+
+
+def test_figures_are_drawn_from_a_finished_run(
+    call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call("train", *TINY)
+    call("draw", "run=run", "figures=sum_rate_maps")
+    figures = tmp_path / "run" / "figures"
+    assert {path.name for path in figures.iterdir()} == {
+        f"sum_rate_maps.{suffix}" for suffix in ("pdf", "png", "csv")
+    }
+    call("draw", "run=run")
+    assert (figures / "learning_curves.pdf").exists()
+    printed = capsys.readouterr().out
+    assert "run: figure animation is left out: there is no flights.parquet" in printed
+    assert printed.endswith("figures: run/figures\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ([], "run is missing: expected run=DIRECTORY"),
+        (["run=nowhere"], "run = 'nowhere': expected a run directory"),
+        (["run=run", "figures=fig2"], "figures = 'fig2': expected one of learning_curves, "),
+        (["run=run", "figures=[energy]"], "figure energy: there is no evaluation.json in run"),
+    ],
+)
+def test_a_mistake_is_answered_by_one_line(
+    call: Call,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    line: str,
+) -> None:
+    call("train", *TINY)
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as stopped:
+        call("draw", *arguments)
+    assert stopped.value.code == 2
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
+    assert line in errors
+    assert not (tmp_path / "nowhere").exists()
