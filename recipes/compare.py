@@ -21,6 +21,7 @@ from hyuav.comparison.work import work_off
 from hyuav.configuration import Config, recipe, section
 from hyuav.evaluation import EvaluationParameters
 from hyuav.learning.training import TrainingParameters
+from hyuav.report.page import write_comparison_report
 from hyuav.tracking import LoggerParameters, log_comparison
 
 
@@ -49,7 +50,9 @@ def main(config: Config, directory: Path) -> None:
         print_tables(summary, options.threshold, console)
         draw(summary, options, directory / "figures")
         logger = LoggerParameters.from_dict(config["logger"])
+        report = write_comparison_report(directory)
         log_comparison(directory, summary, config, logger, console)
+        console.print(f"its report: {report.name}")
     console.print(f"comparison: {directory}", soft_wrap=True)
     for name, reason in failures.items():
         print(f"failed: {name}: {reason}", file=sys.stderr)

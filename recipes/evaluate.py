@@ -18,6 +18,7 @@ from hyuav.evaluation import EvaluationParameters, evaluate
 from hyuav.experiment import learned_policies, print_results, reference_policies
 from hyuav.figures import flight_map, save_figure
 from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text
+from hyuav.report.page import write_run_report
 from hyuav.runs import RunDirectory, require_writable
 from hyuav.tracking import EvaluationLoggerParameters, log_evaluation
 
@@ -70,8 +71,10 @@ def main(config: Config, _: Path) -> None:
     evaluation.save(output)
     save_figure(flight_map(scenario, evaluation.flights), output / "figures", "flight_map")
     print_results(evaluation, console)
+    report = write_run_report(output)
     log_evaluation(output, evaluation, runs, logger, console)
     console.print(f"evaluation: {output}", soft_wrap=True)
+    console.print(f"its report: {report.name}")
 
 
 if __name__ == "__main__":

@@ -33,11 +33,12 @@ from hyuav.learning.algorithms import DDPG
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import Parameters, choice, count, one_or_more, optional, parameter, text
+from hyuav.report.page import write_run_report
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.scenario import PRESETS, Scenario
 from hyuav.schemes.optimum import require_resolution
 from hyuav.system import SCHEMES
-from hyuav.tracking import LoggerParameters
+from hyuav.tracking import LoggerParameters, log_evaluation
 
 
 @dataclass(frozen=True)
@@ -109,9 +110,16 @@ def main(config: Config, directory: Path) -> None:
         beside = work.train(directory / configuration.scenario_name, configuration)
         evaluations.append(work.evaluate(beside, configuration.scenario, beside.path))
     draw(run, options.figures, console)
+    reports = [
+        write_run_report(path)
+        for path in (run.path, *(run.path / own.scenario_name for own in further))
+    ]
+    log_evaluation(run.path, evaluations[0], [run, paper_run], work.logger, console)
     for evaluation in evaluations:
         print_results(evaluation, console)
     console.print(f"figures: {run.figures}", soft_wrap=True)
+    for report in reports:
+        console.print(f"report: {report}", soft_wrap=True)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from hyuav.experiment import resume, saved_weights, train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import Parameters, choice, count, one_or_more, optional, parameter, text
+from hyuav.report.page import write_run_report
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.system import SCHEMES
 from hyuav.tracking import LoggerParameters
@@ -82,6 +83,7 @@ def tell(run: RunDirectory, console: Console) -> None:
     returns = ", ".join(f"{value:.2f}" for value in best)
     console.print(f"best noise-free accumulated reward (bps/Hz): {returns}", soft_wrap=True)
     console.print(f"run: {run.path}", soft_wrap=True)
+    console.print(f"its report: {write_run_report(run.path).name}")
 
 
 if __name__ == "__main__":

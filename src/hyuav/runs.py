@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import io
 import tempfile
 from collections import Counter
 from collections.abc import Mapping
@@ -20,6 +21,8 @@ from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import read_yaml, sequence
 from hyuav.scenario import PRESETS, Scenario
+
+REPORT_FILE = "report.html"
 
 METRIC_COLUMNS = (
     "episode",
@@ -218,6 +221,41 @@ class RunDirectory:
     def metrics(self) -> pd.DataFrame:
         """What training brought, a row per episode and learner."""
         return pd.read_csv(self.metrics_file)
+
+
+def readable_metrics(path: str | Path) -> pd.DataFrame:
+    """What can be read of a ``metrics.csv``, also while it is being written.
+
+    A file that is missing or empty has no rows; a row cut off in the middle, or damaged, is left
+    out. Every column of :data:`METRIC_COLUMNS` is there, all numbers but ``scheme``.
+
+    Args:
+        path: of the file.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError:
+        content = b""
+    whole = content[: content.rfind(b"\n") + 1].replace(b"\0", b"")
+    try:
+        table = pd.read_csv(
+            io.BytesIO(whole),
+            dtype=str,
+            on_bad_lines="skip",
+            encoding_errors="replace",
+            quoting=csv.QUOTE_NONE,
+        )
+    except ValueError:  # nothing in it, or no table
+        table = pd.DataFrame()
+    columns = dict.fromkeys([*METRIC_COLUMNS, *table.columns])
+    numbers = {
+        name: pd.to_numeric(table.get(name, pd.Series(dtype=float)), errors="coerce")
+        for name in columns
+        if name != "scheme"
+    }
+    scheme = table.get("scheme", pd.Series(dtype=str))
+    rows = pd.DataFrame(numbers).assign(scheme=scheme)[list(columns)]
+    return rows.dropna(subset=["episode", "learner", "scheme"]).reset_index(drop=True)
 
 
 class MetricsFile:

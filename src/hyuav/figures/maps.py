@@ -3,7 +3,6 @@
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
-import torch
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -11,8 +10,8 @@ from matplotlib.patches import Patch
 
 from hyuav.envs.rendering import OKABE_ITO, draw_scenario
 from hyuav.figures.style import COLUMN_WIDTH, STYLE
+from hyuav.maps import sum_rates_over_map
 from hyuav.scenario import Scenario
-from hyuav.system import SecureOffloadingSystem
 
 MODE_COLORS = {
     "neither": "0.88",
@@ -38,15 +37,11 @@ def sum_rate_table(scenario: Scenario, resolution: float = 1.0) -> pd.DataFrame:
         row by row from the south-west, ``x`` and ``y`` in m, and in bps/Hz the sum-rates in
         ``relay`` and in ``jamming``, and the ``better`` of both.
     """
-    half = scenario.map_side / 2
-    axis = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64)
-    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
-    positions = torch.cartesian_prod(axis, axis).flip(-1)
-    tasks = system.mean_tasks(positions.shape[:-1]) if system.edge_can_saturate else None
-    relay, jamming = (rates.numpy() for rates in system.sum_rates(positions, tasks=tasks))
-    x, y = positions.numpy().T
-    better = np.maximum(relay, jamming)
-    return pd.DataFrame({"x": x, "y": y, "relay": relay, "jamming": jamming, "better": better})
+    over = sum_rates_over_map(scenario, resolution)
+    x, y = np.meshgrid(over.axis, over.axis)
+    rates = {"relay": over.relay, "jamming": over.jamming, "better": over.better}
+    columns = {"x": x, "y": y, **rates}
+    return pd.DataFrame({name: values.ravel() for name, values in columns.items()})
 
 
 def sum_rate_maps(scenario: Scenario, table: pd.DataFrame) -> Figure:

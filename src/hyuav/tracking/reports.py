@@ -11,14 +11,12 @@ import wandb
 from rich.console import Console
 
 from hyuav.evaluation import LABELS, Evaluation
-from hyuav.runs import RunDirectory
+from hyuav.runs import REPORT_FILE, RunDirectory
 from hyuav.tracking.parameters import AS_TRAINED, LoggerParameters
 from hyuav.tracking.session import Session, model_name, remembered
 
 if TYPE_CHECKING:
     from hyuav.comparison.directory import Summary
-
-REPORT_FILE = "report.html"
 
 
 def log_evaluation(

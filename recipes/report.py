@@ -1,0 +1,41 @@
+"""Write or rewrite the report of a run or of a comparison: one HTML file that opens by itself.
+
+python recipes/report.py run=runs/NAME
+python recipes/report.py run=[runs/ONE,runs/OTHER]
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+from hyuav.configuration import Config, recipe, section
+from hyuav.errors import InputError
+from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text
+from hyuav.report.page import write_report
+
+
+@dataclass(frozen=True)
+class Report(Parameters):
+    """What to report on."""
+
+    run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "directories")), None)
+    """Directories of runs or comparisons, finished or not."""
+    threads: int = parameter(count(), 1)
+
+
+@recipe("report", Report, groups={}, sections={}, run_directory=".")
+def main(config: Config, _: Path) -> None:
+    """Write the reports, and say where they are."""
+    options = section(config, Report)
+    if options.run is None:
+        raise InputError("run is missing: expected run=DIRECTORY, or run=[DIRECTORY,...]")
+    torch.set_num_threads(options.threads)
+    console = Console()
+    for directory in options.run:
+        console.print(f"report: {write_report(directory)}", soft_wrap=True, markup=False)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,139 @@
+"""The report of a comparison: how near to the optimum each algorithm comes."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from hyuav.comparison.plan import LAYOUT
+from hyuav.comparison.shards import CURVES_FILE, RESULTS_FILE
+from hyuav.comparison.statistics import summarize_algorithms, summarize_cells
+from hyuav.comparison.tables import label
+from hyuav.errors import InputError
+from hyuav.evaluation import LABELS, EvaluationParameters, evaluate
+from hyuav.experiment import learned_policies
+from hyuav.report.curves import comparison_figures
+from hyuav.report.html import Page, Picture, Section
+from hyuav.report.player import flight_player
+from hyuav.report.reading import readable_config, readable_table
+from hyuav.report.run import PLAYER_HEIGHT, config_section, map_section
+from hyuav.report.tables import algorithms_table, cells_table
+from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.scenario import Scenario
+
+MAX_FLIGHTS, MAX_MAPS = 8, 2
+"""Of a report: of the longest horizon, and of the presets before random layouts."""
+
+_IDENTITY = {"algorithm", "scenario", "scheme", "num_slots", "seed"}
+_RESULTS = {"fraction", "episodes_to_threshold", "seconds_to_threshold", "seconds"} | _IDENTITY
+_CURVES = {"episode", "fraction"} | _IDENTITY
+_TITLES = ("Share of the optimum", "Learning curves", "Performance profiles")
+_FEW = EvaluationParameters(episodes=2, flights=1)
+
+
+def comparison_page(directory: Path) -> Page:
+    """What a comparison's directory tells, however much of it is there yet."""
+    config = readable_config(directory)
+    threshold = _threshold(config)
+    results, curves = (
+        _rows(directory, name, columns)
+        for name, columns in ((RESULTS_FILE, _RESULTS), (CURVES_FILE, _CURVES))
+    )
+    runs = sorted(_trained(directory), key=_order)
+    sections = [
+        *_results(results, curves, threshold),
+        _flights(runs[:MAX_FLIGHTS]),
+        map_section(dict(list(_scenarios(runs).items())[:MAX_MAPS])),
+        config_section(config),
+    ]
+    facts = {"Share that counts as solved": f"{100 * threshold:g} %"}
+    if results is not None:
+        facts["Algorithms"] = ", ".join(label(str(name)) for name in results["algorithm"].unique())
+        facts["Scenarios"] = str(results["scenario"].nunique())
+        facts["Slots per episode"] = ", ".join(map(str, sorted(results["num_slots"].unique())))
+        facts["Learners"] = str(len(results))
+    return Page("Comparison", directory.resolve().name, facts, sections)
+
+
+def _threshold(config: Mapping[str, Any]) -> float:
+    value = config.get("threshold")
+    return float(value) if isinstance(value, int | float) and 0 <= value <= 1 else 0.97
+
+
+def _rows(directory: Path, name: str, columns: set[str]) -> pd.DataFrame | None:
+    """A table of all finished trainings, or what was gathered of them."""
+    paths = [path / name for path in _finished(directory)] or [directory / name]
+    tables = [table for path in paths if (table := readable_table(path, columns)) is not None]
+    return pd.concat(tables, ignore_index=True) if tables else None
+
+
+def _finished(directory: Path) -> list[Path]:
+    return sorted(path.parent for path in directory.glob(f"shards/*/{RESULTS_FILE}"))
+
+
+def _results(
+    results: pd.DataFrame | None, curves: pd.DataFrame | None, threshold: float
+) -> Iterator[Section]:
+    if results is None or curves is None:
+        yield Section("Results", ["No training is finished yet."])
+        return
+    cells = summarize_cells(results, threshold)
+    figures = comparison_figures(results, curves, cells, threshold)
+    for title, (name, figure) in zip(_TITLES, figures.items(), strict=True):
+        yield Section(title, (), [Picture(name, {"": figure}, int(figure.layout.height))])
+    algorithms = summarize_algorithms(results, threshold)
+    tables = [algorithms_table(algorithms, threshold), cells_table(cells, threshold)]
+    yield Section("Results", (), (), tables)
+
+
+def _trained(directory: Path) -> Iterator[tuple[str, RunDirectory, RunConfiguration]]:
+    """The finished trainings whose weights are kept, with what is compared in each."""
+    for path in _finished(directory):
+        run = RunDirectory(path)
+        try:
+            configuration = run.configuration()
+        except InputError:
+            continue
+        horizon = f"_T{configuration.scenario.num_slots}"
+        entry = path.name.removesuffix(f"_{configuration.scenario_name}{horizon}")
+        if run.best_checkpoint.is_file():
+            yield entry, run, configuration
+
+
+def _order(trained: tuple[str, RunDirectory, RunConfiguration]) -> tuple[bool, int, str, str]:
+    entry, _, configuration = trained
+    name = configuration.scenario_name
+    return name.startswith(LAYOUT), -configuration.scenario.num_slots, name, entry
+
+
+def _scenarios(
+    runs: list[tuple[str, RunDirectory, RunConfiguration]],
+) -> dict[str, Scenario]:
+    return {
+        configuration.scenario_name: configuration.scenario
+        for _, _, configuration in reversed(runs)
+    }
+
+
+def _flights(runs: list[tuple[str, RunDirectory, RunConfiguration]]) -> Section:
+    """A flight of each algorithm's first learner."""
+    figures, notes = {}, []
+    for entry, run, configuration in runs:
+        scenario, name = configuration.scenario, configuration.scenario_name
+        try:
+            policies = learned_policies([run], scenario)
+            scheme = next(scheme for scheme in LABELS if scheme in policies)
+            evaluation = evaluate(scenario, name, {scheme: policies[scheme]}, _FEW)
+        except InputError as error:
+            notes.append(f"{run.path.name} is left out: {error}")
+            continue
+        text = f"{label(entry)}, {name}, T = {scenario.num_slots}, {LABELS[scheme]}"
+        figures[text] = flight_player(scenario, evaluation.flights, scheme)
+    if not figures:
+        return Section("Flights", notes or ["There are no weights to fly by yet."])
+    notes.append(
+        "The best weights of each algorithm's first learner, flown for this report; of the longest "
+        f"horizons, and at most {MAX_FLIGHTS}."
+    )
+    return Section("Flights", notes, [Picture("Flight", figures, PLAYER_HEIGHT)])

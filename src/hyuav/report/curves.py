@@ -1,0 +1,299 @@
+"""Learning curves and the figures of a comparison, as Plotly figures."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from hyuav.comparison.charts import color
+from hyuav.comparison.statistics import learning_curves, performance_profiles
+from hyuav.comparison.tables import label
+from hyuav.evaluation import LABELS
+from hyuav.experiment import LEARNED
+from hyuav.figures.curves import SMOOTHING
+from hyuav.report.style import (
+    DASHES,
+    GRID_COLOR,
+    OPTIMUM_COLOR,
+    axis,
+    base_layout,
+    plain,
+    scheme_color,
+    scheme_dash,
+    scheme_label,
+    translucent,
+)
+
+MAX_POINTS = 500
+"""Of a curve; neighbouring episodes are averaged where there are more."""
+
+QUANTITIES = {
+    "accumulated_reward": "Accumulated reward (bps/Hz)",
+    "evaluation": "Noise-free accumulated reward (bps/Hz)",
+    "best_evaluation": "Best noise-free accumulated reward (bps/Hz)",
+}
+"""Columns of the metrics that can be drawn, with the title of their axis."""
+
+_HORIZON_DASHES = ("solid", "8px,3px,2px,3px", "2px,2px", "10px,4px")
+
+
+def learning_figure(
+    metrics: pd.DataFrame,
+    optima: Mapping[str, float] | None = None,
+    quantity: str = "accumulated_reward",
+) -> go.Figure:
+    """What learners earned against the episodes, a color per scheme.
+
+    The line is the mean over a scheme's learners, smoothed where it is noisy; a band goes from the
+    worst to the best of several. A single learner's own curve stands behind as a thin line.
+
+    Args:
+        metrics: rows of ``metrics.csv``, whose ``scheme`` is a mode rule as it stands there, or
+            a name of :data:`hyuav.evaluation.LABELS`. May be empty.
+        optima: what the best flight of the scheme earns in bps/Hz, by the same names.
+        quantity: a column of :data:`QUANTITIES`.
+    """
+    figure = go.Figure(layout=base_layout())
+    drawn = metrics.dropna(subset=["episode", "learner", "num_slots", quantity])
+    named = drawn.assign(scheme=drawn["scheme"].replace(LEARNED))
+    order = {name: place for place, name in enumerate(LABELS)}
+    pairs = {(str(scheme), float(slots)) for scheme, slots in _pairs(named)}
+    horizons = sorted({horizon for _, horizon in pairs})
+    for scheme, horizon in sorted(pairs, key=lambda pair: (order.get(pair[0], len(order)), pair)):
+        rows = named[(named["scheme"] == scheme) & (named["num_slots"] == horizon)]
+        rewards = rows.pivot_table(quantity, "episode", "learner", sort=True)
+        text, dash = scheme_label(scheme), scheme_dash(scheme)
+        if len(horizons) > 1:
+            text += f", T = {horizon:.0f}"
+            dash = _HORIZON_DASHES[horizons.index(horizon) % len(_HORIZON_DASHES)]
+        _add_curve(figure, rewards, text, scheme_color(scheme), dash, quantity)
+    if len(horizons) <= 1:
+        drawn_schemes = {scheme for scheme, _ in pairs}
+        best = {LEARNED.get(name, name): value for name, value in (optima or {}).items()}
+        _add_optima(figure, {name: best[name] for name in best if name in drawn_schemes})
+    if not pairs:
+        _say(figure, "no episodes yet")
+    figure.update_layout(
+        height=460,
+        margin={"l": 60, "r": 15, "t": 25, "b": 110},
+        xaxis=axis("Episode", rangemode="tozero", nticks=8),
+        yaxis=axis(QUANTITIES[quantity], nticks=8),
+        legend={"orientation": "h", "x": 0, "y": -0.17, "yanchor": "top"},
+        hovermode="closest",
+    )
+    return figure
+
+
+def _pairs(rows: pd.DataFrame) -> Iterable[tuple[object, float]]:
+    return zip(rows["scheme"], rows["num_slots"], strict=True)
+
+
+def _add_curve(
+    figure: go.Figure, rewards: pd.DataFrame, text: str, hue: str, dash: str, quantity: str
+) -> None:
+    """One scheme's curve from a column per learner and a row per episode."""
+    noisy = quantity == "accumulated_reward"
+    smooth = rewards.rolling(SMOOTHING if noisy else 1, min_periods=1).mean()
+    group: dict[str, Any] = {"legendgroup": text, "hoverinfo": "skip", "showlegend": False}
+    if rewards.shape[1] > 1:
+        low, high = _thinned(smooth.min(axis=1)), _thinned(smooth.max(axis=1))
+        figure.add_scatter(
+            x=[*low.index, *high.index[::-1]],
+            y=[*low, *high[::-1]],
+            mode="none",
+            fill="toself",
+            fillcolor=translucent(hue, 0.2),
+            **group,
+        )
+    elif noisy:
+        raw = _thinned(rewards.iloc[:, 0])
+        line = {"color": translucent(hue, 0.25), "width": 0.8}
+        figure.add_scatter(x=list(raw.index), y=list(raw), mode="lines", line=line, **group)
+    mean = _thinned(smooth.mean(axis=1))
+    figure.add_scatter(
+        x=list(mean.index),
+        y=list(mean),
+        mode="lines" if len(mean) > 1 else "markers",
+        line={"color": hue, "width": 2.2, "dash": dash},
+        marker={"color": hue},
+        name=text,
+        legendgroup=text,
+        hovertemplate=f"{text}, episode %{{x:.0f}}: %{{y:.2f}} bps/Hz<extra></extra>",
+    )
+
+
+def _thinned(values: "pd.Series[float]") -> "pd.Series[float]":
+    """At most :data:`MAX_POINTS` values, each the mean of neighbours at their last episode."""
+    step = math.ceil(len(values) / MAX_POINTS)
+    if step <= 1:
+        return values.round(4)
+    groups = np.arange(len(values)) // step
+    last = values.index.to_series().groupby(groups).last()
+    return pd.Series(values.groupby(groups).mean().round(4).to_numpy(), index=last)
+
+
+def _add_optima(figure: go.Figure, optima: Mapping[str, float]) -> None:
+    """A dotted line for each scheme's optimum; one legend entry stands for them all."""
+    values = {value: scheme for scheme, value in optima.items()}
+    for value, scheme in values.items():
+        line = {"color": scheme_color(scheme), "width": 1.4, "dash": DASHES["optimum"]}
+        figure.add_hline(y=value, line=line)
+    if values:
+        line = {"color": OPTIMUM_COLOR, "width": 1.4, "dash": DASHES["optimum"]}
+        figure.add_scatter(x=[None], y=[None], mode="lines", line=line, name="its optimum")
+
+
+def _say(figure: go.Figure, text: str) -> None:
+    figure.add_annotation(
+        text=text, x=0.5, y=0.5, xref="paper", yref="paper", showarrow=False, font={"size": 15}
+    )
+
+
+def comparison_figures(
+    results: pd.DataFrame, curves: pd.DataFrame, cells: pd.DataFrame, threshold: float
+) -> dict[str, go.Figure]:
+    """The figures of a comparison, by their titles.
+
+    Args:
+        results: a row per learner, as :class:`hyuav.comparison.directory.Summary` holds them.
+        curves: a row per evaluation in training, likewise.
+        cells: a row per algorithm, scenario, scheme and horizon, likewise.
+        threshold: share of the optimum that counts as solved, drawn as a line.
+    """
+    lowest = max(math.floor(20 * results["fraction"].min()) / 20, 0.0)
+    profiles = performance_profiles(results, np.linspace(min(lowest, 0.95), 1.0, 101))
+    return {
+        "Interquartile means with 95 % intervals": cells_figure(cells, threshold),
+        "Interquartile means of the best weights so far, with 95 % intervals": bands_figure(
+            learning_curves(curves),
+            ("episode", "Training episodes"),
+            ("iqm", "Share of the optimum (%, IQM)"),
+            threshold,
+        ),
+        "Share of learners that reach a share of the optimum, with 95 % intervals": bands_figure(
+            profiles,
+            ("fraction", "Share of the optimum, τ (%)"),
+            ("share", "Learners that reach τ or more (%)"),
+            threshold,
+        ),
+    }
+
+
+def cells_figure(cells: pd.DataFrame, threshold: float) -> go.Figure:
+    """Each cell's interquartile mean with its interval, and its worst learner as a tick.
+
+    Args:
+        cells: as :func:`hyuav.comparison.statistics.summarize_cells` gives them.
+        threshold: share of the optimum, drawn as a line.
+    """
+    figure = go.Figure(layout=base_layout())
+    names = [
+        f"{plain(row.scenario)}<br>{plain(row.scheme)}, T = {row.num_slots}"
+        for row in cells.itertuples()
+    ]
+    rows = list(dict.fromkeys(names))
+    algorithms = list(dict.fromkeys(cells["algorithm"]))
+    for place, algorithm in enumerate(algorithms):
+        chosen = (cells["algorithm"] == algorithm).to_numpy()
+        own, hue, text = cells[chosen], color(str(algorithm)), plain(label(str(algorithm)))
+        shift = ((len(algorithms) - 1) / 2 - place) * 0.8 / len(algorithms)
+        y = [len(rows) - 1 - rows.index(name) + shift for name in np.array(names)[chosen]]
+        worst = {"symbol": "line-ns", "size": 10, "line": {"color": hue, "width": 1.6}}
+        figure.add_scatter(
+            x=(100 * own["worst"]).tolist(),
+            y=y,
+            mode="markers",
+            marker=worst,
+            legendgroup=text,
+            showlegend=False,
+            hovertemplate=f"{text}, worst: %{{x:.1f}} %<extra></extra>",
+        )
+        figure.add_scatter(
+            x=(100 * own["iqm"]).tolist(),
+            y=y,
+            error_x={
+                "array": (100 * (own["high"] - own["iqm"])).tolist(),
+                "arrayminus": (100 * (own["iqm"] - own["low"])).tolist(),
+                "width": 0,
+                "thickness": 2,
+            },
+            mode="markers",
+            marker={"color": hue, "size": 7},
+            name=text,
+            legendgroup=text,
+            hovertemplate=f"{text}: %{{x:.1f}} %<extra></extra>",
+        )
+    tick = {"symbol": "line-ns", "size": 10, "line": {"color": OPTIMUM_COLOR, "width": 1.6}}
+    figure.add_scatter(x=[None], y=[None], mode="markers", marker=tick, name="worst learner")
+    for boundary in range(len(rows) - 1):
+        figure.add_hline(y=boundary + 0.5, line={"color": GRID_COLOR, "width": 1})
+    line = {"color": OPTIMUM_COLOR, "width": 1.2, "dash": DASHES["optimum"]}
+    figure.add_vline(x=100 * threshold, line=line)
+    height = 26 + 9 * len(algorithms)
+    figure.update_layout(
+        height=170 + len(rows) * height,
+        margin={"l": 110, "r": 20, "t": 20, "b": 110},
+        xaxis=axis("Share of the optimum (%)", nticks=7),
+        yaxis=axis("", range=[-0.5, len(rows) - 0.5], showgrid=False)
+        | {"tickvals": list(range(len(rows))), "ticktext": rows[::-1]},
+        legend=_legend_below(),
+    )
+    return figure
+
+
+def bands_figure(
+    rows: pd.DataFrame, x: tuple[str, str], y: tuple[str, str], threshold: float
+) -> go.Figure:
+    """Lines with their 95 % intervals, one for each algorithm.
+
+    Args:
+        rows: with ``algorithm``, both columns, ``low`` and ``high``; shares are drawn in percent.
+        x: column and title of the horizontal axis.
+        y: column and title of the vertical axis.
+        threshold: share of the optimum, drawn as a line.
+    """
+    figure = go.Figure(layout=base_layout())
+    scale = 100 if x[0] == "fraction" else 1
+    for algorithm, own in rows.groupby("algorithm", sort=False):
+        hue, text = color(str(algorithm)), plain(label(str(algorithm)))
+        across = (scale * own[x[0]]).tolist()
+        figure.add_scatter(
+            x=[*across, *across[::-1]],
+            y=[*(100 * own["low"]), *(100 * own["high"])[::-1]],
+            mode="none",
+            fill="toself",
+            fillcolor=translucent(hue, 0.2),
+            legendgroup=text,
+            hoverinfo="skip",
+            showlegend=False,
+        )
+        figure.add_scatter(
+            x=across,
+            y=(100 * own[y[0]]).tolist(),
+            mode="lines",
+            line={"color": hue, "width": 2.2},
+            name=text,
+            legendgroup=text,
+            hovertemplate=f"{text}, %{{x:.4g}}: %{{y:.1f}} %<extra></extra>",
+        )
+    line = {"color": OPTIMUM_COLOR, "width": 1.2, "dash": DASHES["optimum"]}
+    if scale == 100:
+        figure.add_vline(x=100 * threshold, line=line)
+    else:
+        figure.add_hline(y=100 * threshold, line=line)
+    figure.update_layout(
+        height=420,
+        margin={"l": 60, "r": 20, "t": 20, "b": 100},
+        xaxis=axis(x[1], nticks=7),
+        yaxis=axis(y[1], nticks=8),
+        legend=_legend_below(),
+    )
+    return figure
+
+
+def _legend_below() -> dict[str, Any]:
+    """60 pixels below the plot whatever its height, as the axis titles need that much."""
+    return {"orientation": "h", "x": 0, "yref": "container", "y": 0.01, "yanchor": "bottom"}

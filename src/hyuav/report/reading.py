@@ -1,0 +1,66 @@
+"""Read what a directory holds, as far as it can be read: it may be unfinished or damaged."""
+
+import json
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from pyarrow.lib import ArrowException
+
+from hyuav.errors import InputError
+from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE
+from hyuav.parameters import read_yaml
+
+_FLIGHT_COLUMNS = {
+    *("scheme", "episode", "slot", "x", "y", "relay", "off_map", "secrecy_sum_rate"),
+    *("relay_sum_rate", "jamming_sum_rate", "edge_energy", "helper_energy"),
+    *("offloading", "secrecy_rate", "ue_energy"),
+}
+_ACCOUNT = {"relay_share", "offloading_share", "off_map", "budget_violations"} | {
+    *("ue_energy", "edge_energy", "helper_energy")
+}
+
+
+def readable_config(directory: Path) -> dict[str, Any]:
+    """The directory's ``config.yaml``; empty where there is none that can be read."""
+    try:
+        return read_yaml(directory / "config.yaml")
+    except InputError:
+        return {}
+
+
+def readable_evaluation(directory: Path) -> dict[str, Any] | None:
+    """The content of ``evaluation.json``; None where there is none that can be read."""
+    try:
+        content = json.loads((directory / EVALUATION_FILE).read_text(encoding="utf-8"))
+        complete = all(_is_account(account) for account in content["schemes"].values())
+        whole = all(isinstance(content[name], int) for name in ("num_slots", "episodes"))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+    return content if complete and whole else None
+
+
+def _is_account(account: dict[str, Any]) -> bool:
+    rate = account["secrecy_sum_rate"]
+    low, high = rate["ci95"]
+    needed = [rate["mean"], low, high, *(account[name] for name in _ACCOUNT)]
+    optional = [account.get(f"fraction_of_{name}", 0.0) for name in ("optimum", "hybrid_optimum")]
+    return all(
+        isinstance(value, int | float) and math.isfinite(value) for value in needed + optional
+    )
+
+
+def readable_flights(directory: Path) -> pd.DataFrame | None:
+    """The rows of ``flights.parquet``; None where there are none that can be read."""
+    return readable_table(directory / FLIGHTS_FILE, _FLIGHT_COLUMNS)
+
+
+def readable_table(path: Path, columns: Iterable[str]) -> pd.DataFrame | None:
+    """A Parquet file with at least these columns; None where it is none, yet, or has no rows."""
+    try:
+        table = pd.read_parquet(path)
+    except (OSError, ValueError, ArrowException):
+        return None
+    return table if len(table) and set(columns) <= set(table.columns) else None
