@@ -76,21 +76,25 @@ def test_a_warm_up_hovers_and_sweeps() -> None:
     distance = flights.sum(dim=1).abs().flatten(1).median(dim=1).values  # slots at full speed
     assert distance.min() < 0.5
     assert distance.max() > 15.0
-    vigour = flights[:, 0].abs().flatten(1).median(dim=1).values / 0.6745  # of |n|
-    even = (torch.arange(16) + 0.5) / 15  # the roots of those that are not clipped
-    assert (vigour.sqrt().sort().values[:16] - even).abs().max() < 0.1
+    roots = (flights[:, 0, 0].norm(dim=-1) / 2.0**0.5).sqrt()
+    gentle = roots[roots < 0.8].sort().values  # of those that are not clipped
+    assert len(gentle) >= 10
+    assert gentle.diff().max() < 0.3
+
+
+def test_a_warm_up_sets_out_in_every_direction() -> None:
+    warm_up = WarmUp(1, episodes=60)
+    begun = torch.stack([fly(warm_up, 1, 3)[0, 0] for _ in range(60)])
+    sweeping = begun[begun.abs().amax(dim=-1) == 1.0]  # at full speed along x or y
+    corners = {tuple(row) for row in sweeping[sweeping.abs().amin(dim=-1) == 1.0].tolist()}
+    assert corners == {(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)}
 
 
 def test_a_warm_up_keeps_its_heading() -> None:
     torch.manual_seed(0)
-    actions = fly(WarmUp(5000, episodes=1), 5000, 20)
-    first, second = actions[:-1].flatten(), actions[1:].flatten()
-    assert torch.corrcoef(torch.stack([first, second]))[0, 1] > 0.8
-
-
-def test_each_episode_of_a_warm_up_goes_its_own_way() -> None:
-    torch.manual_seed(0)
-    warm_up = WarmUp(5000, episodes=2)
-    last, first = fly(warm_up, 5000, 3)[-1], fly(warm_up, 5000, 1)[0]
-    correlation = torch.corrcoef(torch.stack([last.flatten(), first.flatten()]))[0, 1]
-    assert correlation.abs() < 0.05
+    warm_up = WarmUp(5000, episodes=30)
+    flights = torch.stack([fly(warm_up, 5000, 20) for _ in range(30)])
+    agreement = (flights[:, :-1].sign() == flights[:, 1:].sign()).float().mean()
+    assert agreement > 0.85
+    turned = (flights[:, 0].sign() != flights[:, -1].sign()).float().mean()
+    assert turned > 0.1  # but not for ever

@@ -1,5 +1,7 @@
 """The noise that Algorithm 1 adds to the actor's action, and what may come before it."""
 
+import math
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
@@ -7,7 +9,9 @@ from tensordict.nn import TensorDictModuleBase
 PERSISTENCE, LARGEST_VIGOUR = 0.97, 4.0
 """Correlation of a warm-up's consecutive actions, and their size before they are clipped."""
 
-GOLDEN_RATIO = (5.0**0.5 - 1.0) / 2.0
+EVENLY = (0.7548776662466927, 0.5698402909980532)
+"""Multiples of both fill the unit square evenly (Roberts, "The unreasonable effectiveness of
+quasirandom sequences", 2018)."""
 
 
 class GaussianNoise(TensorDictModuleBase):
@@ -52,11 +56,11 @@ class GaussianNoise(TensorDictModuleBase):
 class WarmUp(TensorDictModuleBase):
     """Fly at random for some episodes, whatever ``action`` says: hovering, roaming or sweeping.
 
-    An action is an autoregressive Gaussian process of unit variance, begun anew in each episode,
-    times the episode's vigour, and clipped. The vigours' roots fill the range from 0 to that of
-    :data:`LARGEST_VIGOUR` evenly, in the order of the golden ratio's multiples: at the least the
-    helper stays about the start, at the most it crosses the map at full speed. Independent actions
-    would only tremble about the start.
+    An action is an autoregressive Gaussian process of unit variance times the episode's vigour,
+    and clipped. The direction in which an episode begins and the root of its vigour, up to
+    :data:`LARGEST_VIGOUR`, fill their ranges evenly from episode to episode: at the least vigour
+    the helper stays about the start, at the most it crosses the map at full speed, once in every
+    direction whatever the seed. Independent actions would only tremble about the start.
 
     Args:
         learners: N; each flies its own way.
@@ -78,8 +82,11 @@ class WarmUp(TensorDictModuleBase):
         self.episode.add_(begins)
         normal = torch.randn_like(action)
         turned = PERSISTENCE * self.heading + (1.0 - PERSISTENCE**2) ** 0.5 * normal
-        self.heading.copy_(torch.where(begins, normal, turned))
-        vigour = LARGEST_VIGOUR * torch.frac(self.episode * GOLDEN_RATIO).square()
+        share, part = (torch.frac(self.episode * multiple) for multiple in EVENLY)
+        angle = 2.0 * math.pi * part
+        begun = math.sqrt(2.0) * torch.cat([angle.cos(), angle.sin()], dim=-1)
+        self.heading.copy_(torch.where(begins, begun, turned))
+        vigour = LARGEST_VIGOUR * share.square()
         roaming = (vigour * self.heading).clamp(-1.0, 1.0)
         tensordict["action"] = torch.where(self.episode > self._episodes, action, roaming)
         return tensordict
