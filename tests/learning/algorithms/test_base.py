@@ -1,5 +1,7 @@
 """What holds for every algorithm."""
 
+import warnings
+
 import pytest
 import torch
 from tensordict import TensorDict
@@ -73,3 +75,10 @@ def test_the_actor_follows_what_the_explorer_learns(name: str) -> None:
     for index in range(1, 5):
         algorithm.update_networks(mini_batch(2, 20), index)
     assert not torch.equal(before, algorithm.actor(data.clone())["action"])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_building_warns_of_nothing(name: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        build(name, 2)

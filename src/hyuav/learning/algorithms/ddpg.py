@@ -82,13 +82,15 @@ class DDPG(AlgorithmParameters):
         )
 
     def alternative(self, loss: LossModule) -> Callable[[Tensor], Tensor] | None:
-        """Hovering, where it is considered, as the target critics rate it."""
+        """What the target critics hold of hovering; None where that is not considered."""
         if not self.hovering_weight:
             return None
-        weights = getattr(loss, f"target_{self.critic_name}_params")
-        return lambda observation: self.rate(
-            loss, weights, observation, torch.zeros_like(observation[..., :2])
-        )
+
+        def value(observation: Tensor) -> Tensor:
+            weights = getattr(loss, f"target_{self.critic_name}_params")
+            return self.rate(loss, weights, observation, torch.zeros_like(observation[..., :2]))
+
+        return value
 
     @torch.no_grad()
     def rate(
