@@ -58,3 +58,24 @@ def test_learning_curves_do_not_depend_on_how_fast_they_are_made(name: str) -> N
         one, other = (each[part].mean(dim=0).numpy() for each in (fast, eager))
         low, high = stats.t.interval(0.95, len(one) - 1, one.mean(), stats.sem(one))
         assert low <= other.mean() <= high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("num_slots", [10, 20])
+def test_every_seed_of_the_robust_variant_finds_the_far_region(num_slots: int) -> None:
+    """Jamming pays only beyond the eavesdropper, five slots without a reward away."""
+    torch.set_num_threads(1)
+    scenario = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=num_slots)
+    learners = [Learner(scheme, seed) for scheme in ("hybrid", "jamming") for seed in (100, 101)]
+    parameters = TrainingParameters(num_episodes=250, evaluation_every=5)
+    training = Training(scenario, learners, ALGORITHMS["ddpg_robust"](), parameters)
+    earned = torch.stack(
+        [
+            episode.evaluation.sum_rate
+            for episode in training.episodes()
+            if episode.evaluation is not None
+        ]
+    )
+    optima = solve(scenario, ["hybrid", "jamming"])
+    best = torch.tensor([optima[learner.scheme].value for learner in learners])
+    assert bool((earned.amax(dim=0) > 0.95 * best).all())
