@@ -7,7 +7,7 @@ FIGURES := also=random_disk
 QUICK := seeds=2 num_slots=[10,15,20] training.num_episodes=120 candidates=2 \
 	candidate_episodes=20 evaluation.episodes=200 evaluation.resolution=2
 
-.PHONY: help setup reproduce figures figures-quick test test-slow lint format clean
+.PHONY: help setup reproduce figures figures-quick dashboard test test-slow lint format clean
 
 help: ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -27,6 +27,9 @@ figures: setup ## draw all figures of the paper: 10 seeds, N = 10 to 20, both la
 
 figures-quick: setup ## the same within 5 minutes: 2 seeds, N = 10, 15, 20, short trainings
 	$(BIN)/python recipes/reproduce.py $(FIGURES) $(QUICK) $(ARGS)
+
+dashboard: setup ## follow trainings, compare runs, play flights, try scenarios in a browser
+	$(BIN)/python recipes/dashboard.py $(ARGS)
 
 test: setup ## run the tests
 	$(BIN)/python -m pytest --numprocesses 2 $(ARGS)

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
+from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.checkpoint import load_checkpoint, load_weights_file
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training
@@ -170,6 +171,27 @@ def select_initial_weights(
     return join_learners(chosen), best
 
 
+def learned_policy(
+    scenario: Scenario,
+    algorithm: AlgorithmParameters,
+    weights: dict[str, Tensor],
+    learners: Sequence[int],
+) -> Policy:
+    """The noise-free actors of some learners, in the environment that they were trained in.
+
+    Args:
+        scenario: to fly.
+        algorithm: with which they were trained.
+        weights: of all learners, as a training saves them.
+        learners: which of them.
+
+    Raises:
+        InputError: the weights do not fit the algorithm or the number of UEs.
+    """
+    module = LearnedPolicy(scenario, algorithm, weights, learners)
+    return Policy(module, len(learners), algorithm.clock, algorithm.geofence)
+
+
 def learned_policies(
     runs: Sequence[RunDirectory], scenario: Scenario, schemes: Mapping[str, str] = LEARNED
 ) -> dict[str, list[Policy]]:
@@ -199,8 +221,7 @@ def learned_policies(
             if horizon == scenario.num_slots:
                 by_scheme.setdefault(schemes[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
-            module = LearnedPolicy(scenario, algorithm, weights, indices)
-            policy = Policy(module, len(indices), algorithm.clock, algorithm.geofence)
+            policy = learned_policy(scenario, algorithm, weights, indices)
             policies.setdefault(scheme, []).append(policy)
     if not policies:
         accepted = f"what learners were trained for, {', '.join(map(str, sorted(horizons)))}"

@@ -1,0 +1,21 @@
+"""Follow trainings, compare runs, play flights and try scenarios, in a browser.
+
+pip install 'hyuav[dashboard]'
+python recipes/dashboard.py
+python recipes/dashboard.py runs=runs port=8600
+"""
+
+from pathlib import Path
+
+from hyuav.configuration import Config, recipe, section
+from hyuav.dashboard.serve import Dashboard, serve
+
+
+@recipe("dashboard", Dashboard, groups={}, sections={}, run_directory=".")
+def main(config: Config, _: Path) -> None:
+    """Serve the dashboard until Ctrl-C."""
+    serve(section(config, Dashboard))
+
+
+if __name__ == "__main__":
+    main()

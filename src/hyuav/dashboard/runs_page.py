@@ -1,0 +1,204 @@
+"""The page of the runs: what there is, what is in progress, and curves of any of them."""
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pandas as pd
+import streamlit as st
+
+from hyuav.dashboard.curves import X_AXES, Choice, axes_of, comparison
+from hyuav.dashboard.index import STATES, RunEntry, RunIndex
+from hyuav.dashboard.plain import plain, refusals
+from hyuav.dashboard.tables import differences, outcomes
+from hyuav.errors import InputError
+
+KEPT = (
+    *("search", "scenarios", "algorithms", "schemes", "states", "drawn"),
+    *("quantity", "against", "colors"),
+)
+"""Widgets that keep their values while another page is shown."""
+
+SECONDS = 2.0
+"""Between two looks at the files."""
+
+MOST_DRAWN = 40
+"""Runs in one figure."""
+
+_ROW, _TABLE = 35, 290
+"""Heights in pixels."""
+
+
+def show(index: RunIndex) -> None:
+    """The page; while it follows trainings, it is renewed every few seconds."""
+    st.header("Runs", anchor=False)
+    follow = st.toggle(
+        "Follow trainings in progress", value=True, key="follow", persist_state="session"
+    )
+    st.fragment(_page, run_every=SECONDS if follow else None)(index)
+
+
+def _page(index: RunIndex) -> None:
+    entries = index.entries()
+    if not entries:
+        st.info(f"No runs in {plain(index.root)} yet: `python recipes/train.py` begins one.")
+        return
+    now = time.time()
+    found = _filtered(entries, now)
+    running = sum(entry.state(now) == "running" for entry in entries)
+    st.caption(f"{len(found)} of {len(entries)} runs, {running} in progress")
+    height = min(_ROW * (len(found) + 1) + 3, _TABLE)
+    st.dataframe(_listing(found, now), hide_index=True, height=height, column_config=_columns())
+    chosen = _chosen(entries, found)
+    metrics: dict[str, pd.DataFrame] = {}
+    for entry in chosen:
+        with refusals():
+            metrics[entry.name] = index.metrics(entry.name)
+    for entry in chosen:
+        _progress(entry, now)
+    if metrics:
+        _drawn(index, metrics)
+
+
+def _filtered(entries: Sequence[RunEntry], now: float) -> list[RunEntry]:
+    """The runs that the search and the filters leave."""
+    search, filters = st.columns([4, 1], vertical_alignment="bottom")
+    words = search.text_input(
+        "Search", key="search", placeholder="words of a name, scenario, algorithm or scheme"
+    )
+    with filters.popover("Filter", width="stretch"):
+        scenarios = _several("Scenario", "scenarios", {entry.scenario for entry in entries})
+        algorithms = _several("Algorithm", "algorithms", {entry.algorithm for entry in entries})
+        schemes = _several("Mode chosen by", "schemes", {s for e in entries for s in e.schemes})
+        states = st.multiselect("State", STATES, key="states")
+    return [
+        entry
+        for entry in entries
+        if entry.matches(words.split())
+        and (not scenarios or entry.scenario in scenarios)
+        and (not algorithms or entry.algorithm in algorithms)
+        and (not schemes or set(schemes) & set(entry.schemes))
+        and (not states or entry.state(now) in states)
+    ]
+
+
+def _several(label: str, key: str, options: set[str]) -> list[str]:
+    """Some of the options, of which those chosen earlier may be gone."""
+    kept = [value for value in st.session_state.get(key, []) if value in options]
+    st.session_state[key] = kept
+    return st.multiselect(label, sorted(options), key=key)
+
+
+def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
+    return pd.DataFrame(
+        {
+            "run": [entry.name for entry in entries],
+            "state": [entry.state(now) for entry in entries],
+            "episode": [_episodes(entry) for entry in entries],
+            "best": [entry.best for entry in entries],
+            "scenario": [entry.scenario for entry in entries],
+            "algorithm": [entry.algorithm for entry in entries],
+            "schemes": [", ".join(entry.schemes) for entry in entries],
+            "learners": [entry.learners for entry in entries],
+            "begun": pd.to_datetime([round(entry.begun) for entry in entries], unit="s", utc=True),
+        }
+    )
+
+
+def _columns() -> dict[str, Any]:
+    column = st.column_config
+    return {
+        "run": column.TextColumn("Run", width="large"),
+        "state": column.TextColumn("State"),
+        "episode": column.TextColumn("Episode"),
+        "best": column.NumberColumn(
+            "Best return (bps/Hz)", format="%.2f", help="of a learner, noise-free"
+        ),
+        "scenario": column.TextColumn("Scenario"),
+        "algorithm": column.TextColumn("Algorithm"),
+        "schemes": column.TextColumn("Mode chosen by"),
+        "learners": column.NumberColumn("Learners"),
+        "begun": column.DatetimeColumn("Begun (UTC)", format="YYYY-MM-DD HH:mm", timezone="UTC"),
+    }
+
+
+def _episodes(entry: RunEntry) -> str:
+    planned = "" if entry.num_episodes is None else f" of {entry.num_episodes}"
+    return f"{entry.episode}{planned}"
+
+
+def _chosen(entries: Sequence[RunEntry], found: Sequence[RunEntry]) -> list[RunEntry]:
+    """The runs to draw: the newest at first, and then what a person chooses."""
+    by_name = {entry.name: entry for entry in entries}
+    kept = [name for name in st.session_state.get("drawn", []) if name in by_name]
+    if "drawn" not in st.session_state and found:
+        kept = [found[0].name]
+    st.session_state["drawn"] = kept
+    options = list(dict.fromkeys([*kept, *(entry.name for entry in found)]))
+    choice, everything = st.columns([4, 1], vertical_alignment="bottom")
+    everything.button(
+        f"Draw all {len(found)}",
+        on_click=_draw,
+        args=([entry.name for entry in found],),
+        disabled=not 0 < len(found) <= MOST_DRAWN,
+        help=f"possible for up to {MOST_DRAWN} runs",
+        width="stretch",
+    )
+    names = choice.multiselect("Runs to draw", options, key="drawn", max_selections=MOST_DRAWN)
+    return [by_name[name] for name in names]
+
+
+def _draw(names: list[str]) -> None:
+    st.session_state["drawn"] = names
+
+
+def _progress(entry: RunEntry, now: float) -> None:
+    if entry.state(now) == "running" and entry.num_episodes:
+        share = min(entry.episode / entry.num_episodes, 1.0)
+        st.progress(share, f"{plain(entry.name)}: episode {_episodes(entry)}")
+
+
+def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
+    """The figure with its controls, and the tables below it."""
+    choice = _choice(metrics)
+    optima: dict[str, Mapping[str, float]] = {}
+    for name in metrics:
+        with refusals():
+            optima[name] = index.optima(name)
+    figure = comparison(metrics, optima, choice)
+    if not figure.data:
+        st.info("No episode of this quantity is complete yet.")
+        return
+    st.plotly_chart(figure, key="curves", theme=None, config={"displaylogo": False})
+    st.dataframe(outcomes(metrics, choice), hide_index=True)
+    if len(metrics) > 1:
+        st.subheader("What sets these runs apart", anchor=False)
+        try:
+            table = differences({name: index.configuration(name) for name in metrics})
+        except InputError as error:
+            st.error(plain(error))
+            return
+        if table.empty:
+            st.caption("Nothing but their names.")
+        else:
+            st.dataframe(table)
+
+
+def _choice(metrics: Mapping[str, pd.DataFrame]) -> Choice:
+    quantities = axes_of(metrics)
+    what, against, smoothing, colors = st.columns([3, 3, 3, 2])
+    if st.session_state.get("quantity") not in quantities:
+        st.session_state["quantity"] = next(iter(quantities), None)
+    return Choice(
+        y=what.selectbox(
+            "Quantity", list(quantities), format_func=quantities.__getitem__, key="quantity"
+        ),
+        x=against.selectbox("Against", list(X_AXES), format_func=X_AXES.__getitem__, key="against"),
+        smoothing=smoothing.slider(
+            "Smoothing (episodes)",
+            *(1, 200, Choice.smoothing),
+            key="smoothing",
+            persist_state="session",
+        ),
+        color_by=colors.radio("Colour by", ("scheme", "run"), horizontal=True, key="colors"),
+    )
