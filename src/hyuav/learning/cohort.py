@@ -12,6 +12,7 @@ from torchrl.collectors import Collector
 
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
+from hyuav.learning.repetition import BestFlights, as_planned
 from hyuav.learning.replay import make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import (
@@ -85,6 +86,8 @@ class Cohort:
         self.replay = make_replay(
             replay_size, batch_size, self._streams["sampling"], self.env.device
         )
+        self.best_flights = BestFlights(len(seeds), scenario.num_slots, self.env.device)
+        self.episode = self.updates = 0
         self.collector = Collector(
             self.env,
             self._explore,
@@ -96,7 +99,6 @@ class Cohort:
         )
         self._transitions = iter(self.collector)
         self._compiled: CompiledSlots | None = None
-        self.episode = self.updates = 0
         self.best_evaluation = torch.full((len(seeds),), -torch.inf, device=self.env.device)
         self.best_weights = copy_weights(self.algorithm.loss)
 
@@ -115,7 +117,15 @@ class Cohort:
 
     def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
         with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
-            return self.algorithm.explorer(tensordict)
+            tensordict = self.algorithm.explorer(tensordict)
+        if not self.algorithm.parameters.repeat_every:
+            return tensordict
+        return as_planned(tensordict, self._plan()[int(tensordict["step_count"][0])])
+
+    def _plan(self) -> Tensor:
+        """Actions (T, N, 2) that are taken whatever the explorer says, NaN where there are none."""
+        planned = self.best_flights.actions
+        return planned if self.algorithm.repeats(self.episode) else planned * torch.nan
 
     @property
     def learns(self) -> bool:
@@ -152,11 +162,15 @@ class Cohort:
         self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
         self.algorithm.parameters.memory.finish_episode(self.replay, self.scenario.num_slots)
+        if self.algorithm.parameters.repeat_every:
+            self.best_flights.keep(flown[0], self.replay)
         return flown
 
     def _fly_compiled(self, compiled: CompiledSlots) -> tuple[Tensor, dict[str, Tensor]]:
         slots, draws = self.scenario.num_slots, self.env.base_env.draws
         blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
+        if self.algorithm.parameters.repeat_every:
+            blocks["plan"] = self._plan()
         if self.scenario.fading:
             blocks["fading"] = draws.take_fading(slots).contiguous()  # where rows are shared
         if self.env.base_env.system.edge_can_saturate:
@@ -237,6 +251,7 @@ class Cohort:
             "random": {name: stream.state() for name, stream in self._streams.items()},
             "episode": self.episode,
             "updates": self.updates,
+            "best_flights": self.best_flights.state(),
             "best_evaluation": self.best_evaluation,
             "best_weights": self.best_weights,
         }
@@ -253,6 +268,7 @@ class Cohort:
         for name, stream in self._streams.items():
             stream.set_state(state["random"][name])
         self.episode, self.updates = state["episode"], state["updates"]
+        self.best_flights.set_state(state["best_flights"])
         self.best_evaluation = state["best_evaluation"].to(self.env.device)
         self.best_weights = {
             name: values.to(self.env.device) for name, values in state["best_weights"].items()

@@ -18,6 +18,7 @@ from torchrl.envs import TransformedEnv
 
 from hyuav.envs.draws import GivenDraws
 from hyuav.learning.algorithms import Algorithm, GradientStep
+from hyuav.learning.repetition import as_planned
 from hyuav.learning.replay import sampled_slots
 from hyuav.randomness import given_normals
 from hyuav.recording import compile_function
@@ -81,8 +82,9 @@ class CompiledSlots:
             draws: random numbers, a slot in each row: ``exploration`` (slots, N, n, 2), standard
                 normal, where the explorer draws n times; ``sampling`` (slots, N, K), uniform;
                 ``losses`` (slots, N, n, K, 2), standard normal, where the losses draw n times;
-                ``fading`` (slots, N, 3 U + 2) and ``tasks`` (slots, N, 2, U) where the
-                environment needs them.
+                ``plan`` (slots, N, 2), actions to take whatever the explorer says, NaN for none,
+                where the algorithm repeats flights; ``fading`` (slots, N, 3 U + 2) and ``tasks``
+                (slots, N, 2, U) where the environment needs them.
             updates: taken before.
             episode: which one it is, from 1.
 
@@ -143,6 +145,8 @@ class CompiledSlots:
             "sampling": (learners, batch_size),
             "corrections": (len(steps), 2),
         }
+        if self._algorithm.parameters.repeat_every:
+            shapes["plan"] = (learners, 2)
         if normals:
             shapes["losses"] = (learners, normals, batch_size, 2)
         if system.scenario.fading:
@@ -170,7 +174,7 @@ class CompiledSlots:
         try:
             with given_normals(iter(given["exploration"].unbind(dim=1))):
                 action = self._algorithm.explorer(self._carrier.clone(False))
-            return env.step(action)
+            return env.step(as_planned(action, given["plan"]) if "plan" in given else action)
         finally:
             env.base_env.draws = draws
 

@@ -106,6 +106,10 @@ class Training:
         self.learners = tuple(learners)
         on_cpu = as_device(device).type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
+        longest = max(self.horizons)
+        if algorithm.repeat_every and parameters.replay_size < longest:
+            accepted = f"at least the {longest} slots of a flight, for repeat_every"
+            raise InputError(rejection("replay_size", parameters.replay_size, accepted))
         self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
         self.cohorts = [
             Cohort(

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 from batches import mini_batch
 from hyuav.learning.algorithms import DDPG, TD3, Algorithm
-from hyuav.learning.algorithms.ddpg import UNSATURATED, saturation
+from hyuav.learning.algorithms.ddpg import CLEARLY, UNSATURATED, alternatives, saturation
 from hyuav.learning.replay import RETURN
 from hyuav.randomness import given_normals
 
@@ -99,11 +99,12 @@ def test_the_defaults_are_the_papers() -> None:
         "reward_scale": 1.0,
         "layer_norm": False,
         "warm_up_episodes": 0,
+        "repeat_every": 0,
         "restart_after": 0,
         "learning_rate_decay": 1.0,
         "action_stretch": 1.0,
         "saturation_penalty": 0.0,
-        "hovering_weight": 0.0,
+        "alternatives_weight": 0.0,
         "return_bound": 0.0,
         "return_bound_decay": 1.0,
         "noise_floor": 0.0,
@@ -132,13 +133,13 @@ def test_a_saturated_actor_is_drawn_back(kind: type[DDPG]) -> None:
     assert bool((bias < 9.0).all())
 
 
-def actor_alone(kind: type[DDPG], hovering_weight: float, slope: float) -> Algorithm:
+def flying_along_x(kind: type[DDPG], weight: float, slope: float) -> Algorithm:
     """One learner that flies at half speed along x, and critics for which speed has this slope.
 
-    All of its hidden unit but the first are cut off from the critics, which hold that flying at
-    the speed a along x is worth slope * a, as long as that is small.
+    Of their hidden units all but the first are cut off, so that they hold that flying at the
+    speed v along x is worth slope * v.
     """
-    algorithm = kind(hidden_sizes=(8,), hovering_weight=hovering_weight).build(1, 15)
+    algorithm = kind(hidden_sizes=(8,), alternatives_weight=weight).build(1, 15)
     with torch.no_grad():
         for name, values in algorithm.loss.state_dict().items():
             if values.ndim:
@@ -152,38 +153,53 @@ def actor_alone(kind: type[DDPG], hovering_weight: float, slope: float) -> Algor
     return algorithm
 
 
-@pytest.mark.parametrize("kind", [DDPG, TD3])
-def test_an_actor_is_held_back_only_where_hovering_is_worth_more(kind: type[DDPG]) -> None:
-    batch = mini_batch(1, 5)
-    for slope, expected in ((-1.0, 0.25), (1.0, 0.0)):
-        hyperparameters = kind(hidden_sizes=(8,), hovering_weight=2.0)
-        algorithm = actor_alone(kind, 2.0, slope)
-        speed = hyperparameters.needless_speed(algorithm.loss, batch)
-        torch.testing.assert_close(speed, torch.full((1, 5), expected))
-        plain = actor_alone(kind, 0.0, slope).steps[1].loss(batch.clone())
-        added = algorithm.steps[1].loss(batch.clone()) - plain
-        torch.testing.assert_close(added, torch.full((1, 5), 2.0 * expected))
+def test_the_alternatives_are_to_hover_to_turn_round_and_to_flip_a_component() -> None:
+    found = alternatives(torch.tensor([[[0.5, -0.2]]]))
+    assert found.shape == (1, 4, 1, 2)
+    expected = torch.tensor([[0.0, 0.0], [-0.5, 0.2], [-0.5, -0.2], [0.5, 0.2]])
+    assert torch.equal(found[0, :, 0], expected)
+
+
+LITTLE = 0.9 * CLEARLY
+"""A slope at which turning round, from half speed, gains less than what counts."""
 
 
 @pytest.mark.parametrize("kind", [DDPG, TD3])
-def test_the_target_counts_hovering_where_it_is_worth_more(kind: type[DDPG]) -> None:
+@pytest.mark.parametrize(("slope", "expected"), [(-1.0, 1.0), (-LITTLE, 0.0), (1.0, 0.0)])
+def test_an_actor_is_drawn_to_an_alternative_only_where_it_is_clearly_better(
+    kind: type[DDPG], slope: float, expected: float
+) -> None:
+    batch, weight = mini_batch(1, 5), 2.0
+    algorithm = flying_along_x(kind, weight, slope)
+    plain = flying_along_x(kind, 0.0, slope).steps[1].loss(batch.clone())
+    added = algorithm.steps[1].loss(batch.clone()) - plain
+    # To turn round is a distance of 1.
+    torch.testing.assert_close(added, torch.full((1, 5), weight * expected))
+
+
+@pytest.mark.parametrize("kind", [DDPG, TD3])
+@pytest.mark.parametrize("slope", [-4.0, 4.0, -LITTLE])
+def test_the_target_counts_the_best_alternative_where_it_is_clearly_better(
+    kind: type[DDPG], slope: float
+) -> None:
     batch = mini_batch(1, 5)
-    batch["observation"].zero_()
     batch["action"].zero_()  # which the critics hold to be worth nothing
     batch["next", "reward"].fill_(2.0)
-    for slope, following in ((-4.0, 0.0), (4.0, 2.0)):
-        algorithm = actor_alone(kind, 1.0, slope)
-        with given_normals(iter([torch.zeros(1, 5, 2)])):
-            loss = algorithm.steps[0].loss(batch.clone())
-        critics = 1 + (kind is TD3)
-        expected = critics * (2.0 + 0.95 * following) ** 2
-        torch.testing.assert_close(loss, torch.full((1, 5), expected), rtol=1e-3, atol=0.0)
+    batch["next", "terminated"][:, 0] = True
+    algorithm = flying_along_x(kind, 1.0, slope)
+    with given_normals(iter([torch.zeros(1, 5, 2)])):
+        loss = algorithm.steps[0].loss(batch.clone())
+    following = max(0.5 * slope, 0.5 * abs(slope) - CLEARLY)
+    critics = 1 + (kind is TD3)
+    expected = torch.full((1, 5), critics * (2.0 + 0.95 * following) ** 2)
+    expected[:, 0] = critics * 2.0**2
+    torch.testing.assert_close(loss, expected, rtol=1e-3, atol=0.0)
 
 
 @pytest.mark.parametrize("kind", [DDPG, TD3])
-def test_considering_hovering_leaves_the_targets_without_gradients(kind: type[DDPG]) -> None:
+def test_weighing_alternatives_leaves_the_targets_without_gradients(kind: type[DDPG]) -> None:
     torch.manual_seed(0)
-    algorithm = kind(hidden_sizes=(8,), hovering_weight=1.0, return_bound=0.5).build(2, 15)
+    algorithm = kind(hidden_sizes=(8,), alternatives_weight=1.0, return_bound=0.5).build(2, 15)
     for index in range(1, 5):
         batch = mini_batch(2, 20)
         batch[RETURN] = torch.randn(2, 20, 1)

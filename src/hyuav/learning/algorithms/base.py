@@ -45,6 +45,9 @@ class AlgorithmParameters(Parameters, ABC):
     """In the critics."""
     warm_up_episodes: int = parameter(count(0), 0)
     """Flown at random; see :class:`hyuav.learning.exploration.WarmUp`."""
+    repeat_every: int = parameter(count(0), 0)
+    """After the warm-up, and until actors restart, every n-th episode repeats the best flight so
+    far; 0 for never. See :class:`hyuav.learning.repetition.BestFlights`."""
     restart_after: int = parameter(count(0), 0)
     """Episodes from which on an actor that is evaluated and found worse than it was goes on from
     its best weights; 0 for never."""
@@ -153,6 +156,12 @@ class Algorithm:
     def restarts(self, episode: int) -> bool:
         """Whether actors go back to their best weights after this episode's evaluation."""
         return 0 < self.parameters.restart_after <= episode
+
+    def repeats(self, episode: int) -> bool:
+        """Whether an episode, from 1, is the best flight so far once more."""
+        every = self.parameters.repeat_every
+        explores = episode > self.parameters.warm_up_episodes and not self.restarts(episode)
+        return every > 0 and episode % every == 0 and explores
 
     def due(self, index: int) -> tuple[bool, ...]:
         """Which gradient steps the update of this index takes, and last whether targets follow."""

@@ -18,6 +18,10 @@ from hyuav.parameters import choice, number, parameter
 UNSATURATED = 2.0
 """An output before the tanh that still can be turned."""
 
+CLEARLY = 0.025
+"""Scaled reward by which an alternative must be worth more; where hovering just so is all that
+matters, the best actions are near, and gradients find them."""
+
 
 @dataclass(frozen=True)
 class DDPG(AlgorithmParameters):
@@ -32,9 +36,9 @@ class DDPG(AlgorithmParameters):
     """Of the actor's tanh; see :class:`hyuav.learning.networks.StretchedTanh`."""
     saturation_penalty: float = parameter(number(0.0), 0.0)
     """Weight of :func:`saturation` in the actor's loss."""
-    hovering_weight: float = parameter(number(0.0), 0.0)
-    """How strongly the actor is drawn to hover where that is worth more than what it does; with
-    any weight, the critics' target counts whichever is worth more."""
+    alternatives_weight: float = parameter(number(0.0), 0.0)
+    """How strongly the actor is drawn to the best of :func:`alternatives` where that is worth more
+    than what it does; with any weight, the critics' target counts whichever is worth more."""
 
     critic_name: ClassVar[str] = "value_network"
     """What the loss calls its critic."""
@@ -52,7 +56,7 @@ class DDPG(AlgorithmParameters):
             delay_value=True,
             reduction="none",
         )
-        self.estimate_values(loss, learners, self.alternative(loss))
+        self.estimate_values(loss, learners, self.best_alternative(loss))
         critic_optimizer = adam(loss.value_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
@@ -64,7 +68,7 @@ class DDPG(AlgorithmParameters):
                 GradientStep("critic", lambda batch: loss.loss_value(batch)[0], critic_optimizer),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.loss_actor(batch)[0] + self.held_back(loss, batch),
+                    lambda batch: loss.loss_actor(batch)[0] + self.restrained(loss, batch),
                     actor_optimizer,
                 ),
             ),
@@ -81,47 +85,86 @@ class DDPG(AlgorithmParameters):
             self.noise_floor,
         )
 
-    def alternative(self, loss: LossModule) -> Callable[[Tensor], Tensor] | None:
-        """What the target critics hold of hovering; None where that is not considered."""
-        if not self.hovering_weight:
+    def best_alternative(self, loss: LossModule) -> Callable[[Tensor], Tensor] | None:
+        """What the target critics hold of the best alternative, less :data:`CLEARLY`.
+
+        None where alternatives are not weighed.
+        """
+        if not self.alternatives_weight:
             return None
 
         def value(observation: Tensor) -> Tensor:
-            weights = getattr(loss, f"target_{self.critic_name}_params")
-            return self.rate(loss, weights, observation, torch.zeros_like(observation[..., :2]))
+            action = self.act(loss, loss.target_actor_network_params, observation)
+            critics = getattr(loss, f"target_{self.critic_name}_params")
+            values = self.rate(loss, critics, observation, alternatives(action))
+            return values.amax(dim=1) - CLEARLY
 
         return value
 
+    def act(self, loss: LossModule, weights: TensorDictParams, observation: Tensor) -> Tensor:
+        """What the actors do with these weights: (N, K, 2)."""
+        with weights.to_module(loss.actor_network, preserve_module_state=False):
+            action: Tensor = loss.actor_network.module(observation)
+        return action
+
     @torch.no_grad()
     def rate(
-        self, loss: LossModule, weights: TensorDictParams, observation: Tensor, action: Tensor
+        self, loss: LossModule, weights: TensorDictParams, observation: Tensor, actions: Tensor
     ) -> Tensor:
-        """What the critics, with these weights, hold of an action: the least of them, (N, K, 1)."""
+        """What the critics, with these weights, hold of actions (N, A, K, 2): (N, A, K, 1).
+
+        Of several critics it is the least.
+        """
         network = getattr(loss, self.critic_name)
+        observed = observation.unsqueeze(1).expand(*actions.shape[:-1], -1)
         values = []
         for own in weights.unbind(0) if weights.batch_dims else (weights,):
             with own.to_module(network, preserve_module_state=False):
-                values.append(network.module(observation, action))
+                values.append(network.module(observed, actions))
         return torch.stack(values).amin(dim=0)
 
-    def held_back(self, loss: LossModule, batch: TensorDictBase) -> Tensor | float:
-        """What is added to the actor's loss against flying too fast: (N, K)."""
+    def restrained(self, loss: LossModule, batch: TensorDictBase) -> Tensor | float:
+        """What is added to the actor's loss, so that it does not stick: (N, K)."""
         added: Tensor | float = 0.0
         if self.saturation_penalty:
             added = added + self.saturation_penalty * saturation(loss, batch)
-        if self.hovering_weight:
-            added = added + self.hovering_weight * self.needless_speed(loss, batch)
+        if self.alternatives_weight:
+            added = added + self.alternatives_weight * self.missed(loss, batch)
         return added
 
-    def needless_speed(self, loss: LossModule, batch: TensorDictBase) -> Tensor:
-        """The square of the actor's speed where hovering is worth more, elsewhere 0: (N, K)."""
+    def missed(self, loss: LossModule, batch: TensorDictBase) -> Tensor:
+        """Squared distance of the actor from the best alternative, 0 where none is clearly better.
+
+        Args:
+            loss: with the actor and the critics.
+            batch: (N, K) transitions.
+
+        Returns:
+            (N, K).
+        """
         observation = batch["observation"]
-        with loss.actor_network_params.to_module(loss.actor_network):
-            action: Tensor = loss.actor_network.module(observation)
+        action = self.act(loss, loss.actor_network_params, observation)
+        others = alternatives(action.detach())
         weights = getattr(loss, f"{self.critic_name}_params").data
-        chosen = self.rate(loss, weights, observation, action)
-        hovering = self.rate(loss, weights, observation, torch.zeros_like(action))
-        return ((hovering > chosen) * action.square()).sum(dim=-1)
+        actions = torch.cat([action.detach().unsqueeze(1), others], dim=1)
+        values = self.rate(loss, weights, observation, actions).squeeze(-1)
+        worth, best = values[:, 1:].max(dim=1)
+        chosen = torch.take_along_dim(others, best[:, None, :, None], dim=1).squeeze(1)
+        distance = (action - chosen).square().sum(dim=-1)
+        return (worth > values[:, 0] + CLEARLY) * distance
+
+
+def alternatives(action: Tensor) -> Tensor:
+    """Other ways to fly than (N, K, 2): to hover, to turn round, to flip either component.
+
+    An actor climbs to the nearest summit of what its critic holds of actions. Where the best one
+    lies across a valley, in another direction or at rest, one of these is likely to be beyond it.
+
+    Returns:
+        (N, 4, K, 2).
+    """
+    signs = ((0.0, 0.0), (-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0))
+    return torch.stack([action * action.new_tensor(each) for each in signs], dim=1)
 
 
 def saturation(loss: LossModule, batch: TensorDictBase) -> Tensor:

@@ -26,6 +26,7 @@ class Robust(AlgorithmParameters):
     reward_scale: float = parameter(number(above=0.0), 0.05)
     layer_norm: bool = parameter(switch, True)
     warm_up_episodes: int = parameter(count(0), 60)
+    repeat_every: int = parameter(count(0), 4)
     restart_after: int = parameter(count(0), 200)
     return_bound: float = parameter(number(0.0, 1.0), 0.3)
     return_bound_decay: float = parameter(number(0.0, 1.0), 0.999)
@@ -41,7 +42,7 @@ class RobustDDPG(Robust, DDPG):
     noise_floor: float = parameter(number(0.0, 1.0), 0.1)
     action_stretch: float = parameter(number(1.0, 2.0), 1.04)
     saturation_penalty: float = parameter(number(0.0), 0.1)
-    hovering_weight: float = parameter(number(0.0), 0.1)
+    alternatives_weight: float = parameter(number(0.0), 0.1)
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class TD3(DDPG):
             loss_function="l2",
             reduction="none",
         )
-        self.estimate_values(loss, learners, self.alternative(loss))
+        self.estimate_values(loss, learners, self.best_alternative(loss))
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
@@ -54,7 +54,7 @@ class TD3(DDPG):
                 ),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.actor_loss(batch)[0] + self.held_back(loss, batch),
+                    lambda batch: loss.actor_loss(batch)[0] + self.restrained(loss, batch),
                     actor_optimizer,
                     every=self.actor_every,
                 ),

@@ -1,0 +1,74 @@
+"""Flying the best flight so far once more."""
+
+import dataclasses
+from typing import Any
+
+import pytest
+import torch
+
+from hyuav import InputError, Scenario
+from hyuav.learning.algorithms import DDPG
+from hyuav.learning.cohort import Cohort, Learner
+from hyuav.learning.training import Training, TrainingParameters
+
+SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
+LEARNERS = [Learner("hybrid", 1), Learner("jamming", 2), Learner("relay", 3)]
+
+
+def cohort(**hyperparameters: Any) -> Cohort:
+    algorithm = DDPG(hidden_sizes=(8,), noise_decay=1.0, **hyperparameters)
+    return Cohort(SCENARIO, LEARNERS, algorithm, replay_size=20, batch_size=8, device=None)
+
+
+def flown(trained: Cohort) -> torch.Tensor:
+    """The actions (T, N, 2) of the last episode."""
+    slots = torch.arange(-SCENARIO.num_slots, 0) + trained.replay.writer._cursor
+    return torch.as_tensor(trained.replay.storage._storage["action"][slots % 20])
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_every_nth_episode_takes_the_actions_of_each_learners_best(compiled: bool) -> None:
+    trained = cohort(repeat_every=3, warm_up_episodes=2, restart_after=14)
+    rewards: list[torch.Tensor] = []
+    flights: list[torch.Tensor] = []
+    repeated = []
+    for episode in range(1, 17):
+        if compiled and episode == 4:
+            trained.compile()
+        reward, _ = trained.fly()
+        if trained.algorithm.repeats(episode):
+            best = torch.stack(rewards).argmax(dim=0)
+            expected = torch.stack([flights[index][:, n] for n, index in enumerate(best)], dim=1)
+            torch.testing.assert_close(flown(trained), expected)
+            repeated.append(episode)
+        rewards.append(reward)
+        flights.append(flown(trained))
+    assert repeated == [3, 6, 9, 12]
+    assert not torch.equal(flights[14], flights[11])
+
+
+def test_without_repetition_no_flight_is_flown_twice() -> None:
+    trained = cohort()
+    flights = []
+    for _ in range(6):
+        trained.fly()
+        flights.append(flown(trained))
+    for index, flight in enumerate(flights):
+        assert not any(torch.equal(flight, other) for other in flights[:index])
+
+
+def test_the_best_flight_goes_on_with_a_training_that_is_resumed() -> None:
+    first, second = cohort(repeat_every=2), cohort(repeat_every=2)
+    for _ in range(5):
+        first.fly()
+    second.load_state_dict(first.state_dict())
+    for trained in (first, second):
+        trained.fly()
+    assert torch.equal(flown(first), flown(second))
+    assert torch.equal(first.best_flights.reward, second.best_flights.reward)
+
+
+def test_a_memory_shorter_than_a_flight_is_refused() -> None:
+    parameters = TrainingParameters(num_episodes=2, replay_size=5, batch_size=4)
+    with pytest.raises(InputError, match="replay_size = 5: expected at least the 6 slots"):
+        Training(SCENARIO, LEARNERS, DDPG(repeat_every=2), parameters)
