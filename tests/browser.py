@@ -4,10 +4,19 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Literal
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import ConsoleMessage, Dialog, Page, Route, sync_playwright
+from playwright.sync_api import (
+    BrowserContext,
+    ConsoleMessage,
+    Dialog,
+    Page,
+    Route,
+    expect,
+    sync_playwright,
+)
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
@@ -40,27 +49,45 @@ class BrowserPage:
 
 
 @contextmanager
-def browser_page(width: int, height: int, color_scheme: str = "light") -> Iterator[BrowserPage]:
+def browser(color_scheme: Literal["light", "dark"] = "light") -> Iterator[BrowserContext]:
+    """Start a browser, in which windows share what they fetched.
+
+    Args:
+        color_scheme: that the person prefers.
+    """
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=_FLAGS)
+        try:
+            yield chromium.new_context(color_scheme=color_scheme, reduced_motion="reduce")
+        finally:
+            chromium.close()
+
+
+@contextmanager
+def window(context: BrowserContext, width: int, height: int) -> Iterator[BrowserPage]:
     """Open a window; whatever happens in it is recorded.
 
     Args:
+        context: of :func:`browser`.
         width: of the window in CSS pixels.
         height: of the window in CSS pixels.
-        color_scheme: that the person prefers, ``light`` or ``dark``.
     """
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=_FLAGS)
-        try:
-            context = browser.new_context(
-                viewport={"width": width, "height": height},
-                color_scheme="dark" if color_scheme == "dark" else "light",
-            )
-            opened = BrowserPage(context.new_page())
-            opened.page.set_default_timeout(PATIENCE)
-            _watch(opened)
-            yield opened
-        finally:
-            browser.close()
+    opened = BrowserPage(context.new_page())
+    opened.page.set_viewport_size({"width": width, "height": height})
+    opened.page.set_default_timeout(PATIENCE)
+    expect.set_options(timeout=PATIENCE)
+    _watch(opened)
+    try:
+        yield opened
+    finally:
+        opened.page.close()
+
+
+@contextmanager
+def browser_page(width: int, height: int) -> Iterator[BrowserPage]:
+    """Open a window of a browser of its own."""
+    with browser() as context, window(context, width, height) as opened:
+        yield opened
 
 
 def _watch(opened: BrowserPage) -> None:

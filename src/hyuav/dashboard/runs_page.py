@@ -84,9 +84,14 @@ def _filtered(entries: Sequence[RunEntry], now: float) -> list[RunEntry]:
 
 def _several(label: str, key: str, options: set[str]) -> list[str]:
     """Some of the options, of which those chosen earlier may be gone."""
-    kept = [value for value in st.session_state.get(key, []) if value in options]
-    st.session_state[key] = kept
+    _keep(key, [value for value in st.session_state.get(key, []) if value in options])
     return st.multiselect(label, sorted(options), key=key)
+
+
+def _keep(key: str, values: list[str]) -> None:
+    """Set a widget only if need be, or a choice made during this renewal would be taken back."""
+    if st.session_state.get(key) != values:
+        st.session_state[key] = values
 
 
 def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
@@ -108,7 +113,7 @@ def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
 def _columns() -> dict[str, Any]:
     column = st.column_config
     return {
-        "run": column.TextColumn("Run", width="large"),
+        "run": column.TextColumn("Run", width="medium"),
         "state": column.TextColumn("State"),
         "episode": column.TextColumn("Episode"),
         "best": column.NumberColumn(
@@ -133,7 +138,7 @@ def _chosen(entries: Sequence[RunEntry], found: Sequence[RunEntry]) -> list[RunE
     kept = [name for name in st.session_state.get("drawn", []) if name in by_name]
     if "drawn" not in st.session_state and found:
         kept = [found[0].name]
-    st.session_state["drawn"] = kept
+    _keep("drawn", kept)
     options = list(dict.fromkeys([*kept, *(entry.name for entry in found)]))
     choice, everything = st.columns([4, 1], vertical_alignment="bottom")
     everything.button(
