@@ -13,7 +13,7 @@ from dashboard_runs import write_run
 from dashboard_server import dashboard, recipe
 from hyuav.dashboard.draft import load
 
-pytestmark = needs_chromium
+pytestmark = [needs_chromium, pytest.mark.slow]
 
 LONG = 100_000
 """Logged points of the longest run."""
