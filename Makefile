@@ -25,7 +25,7 @@ reproduce: setup ## train Proposed, Re-OT and Ja-OT, evaluate them, draw the fig
 figures: setup ## draw all figures of the paper: 10 seeds, N = 10 to 20, both layouts
 	$(BIN)/python recipes/reproduce.py $(FIGURES) seeds=10 num_slots=[10,12,14,16,18,20] $(ARGS)
 
-figures-quick: setup ## the same within 5 minutes: 2 seeds, N = 10, 15, 20, short trainings
+figures-quick: setup ## the same, quick and rough: 2 seeds, N = 10, 15, 20, short trainings
 	$(BIN)/python recipes/reproduce.py $(FIGURES) $(QUICK) $(ARGS)
 
 dashboard: setup ## follow trainings, compare runs, play flights, try scenarios in a browser

@@ -76,10 +76,8 @@ class Shard:
 def _train(shard: Shard, directory: Path) -> tuple[pd.DataFrame, list[float]]:
     """The evaluations of a training by this project, and the best actors' sum-rates in bps/Hz."""
     configuration, scenario = shard.configuration, shard.configuration.scenario
-    logger = dataclasses.replace(
-        in_group(shard.logger, shard.parent.parent), name=shard.name, id=None
-    )
     logs = shard.parent.parent  # which does not change its name
+    logger = dataclasses.replace(in_group(shard.logger, logs), name=shard.name, id=None)
     run = train(directory, configuration, logger, Console(quiet=True), logs=logs)
     metrics = run.metrics().dropna(subset="evaluation")
     metrics["seconds"] /= len(configuration.learners)

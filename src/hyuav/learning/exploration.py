@@ -59,8 +59,9 @@ class WarmUp(TensorDictModuleBase):
     An action is an autoregressive Gaussian process of unit variance times the episode's vigour,
     and clipped. The direction in which an episode begins and the root of its vigour, up to
     :data:`LARGEST_VIGOUR`, fill their ranges evenly from episode to episode: at the least vigour
-    the helper stays about the start, at the most it crosses the map at full speed, once in every
-    direction whatever the seed. Independent actions would only tremble about the start.
+    the helper stays about the start, at the most it crosses the map at full speed. The directions
+    cover the circle whatever the seed, and in the same order for all learners. Independent
+    actions would only tremble about the start.
 
     Args:
         learners: N; each flies its own way.
