@@ -59,9 +59,9 @@ class WarmUp(TensorDictModuleBase):
     An action is an autoregressive Gaussian process of unit variance times the episode's vigour,
     and clipped. The direction in which an episode begins and the root of its vigour, up to
     :data:`LARGEST_VIGOUR`, fill their ranges evenly from episode to episode: at the least vigour
-    the helper stays about the start, at the most it crosses the map at full speed. The directions
-    cover the circle whatever the seed, and in the same order for all learners. Independent
-    actions would only tremble about the start.
+    the helper stays about the start, at the most it crosses the map at full speed. Each learner
+    draws where in this sequence it begins, so that the directions cover the circle whatever the
+    seed, and in an order of its own. Independent actions would only tremble about the start.
 
     Args:
         learners: N; each flies its own way.
@@ -75,15 +75,19 @@ class WarmUp(TensorDictModuleBase):
         super().__init__()
         self._episodes = episodes
         self.register_buffer("heading", torch.zeros(learners, 2))
+        self.register_buffer("origin", torch.zeros(learners, 2))
         self.register_buffer("episode", torch.zeros(learners, 1))
+        self.register_buffer("multiples", torch.tensor(EVENLY), persistent=False)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Read ``action`` (N, 2) and ``step_count`` (N, 1), write the ``action`` to take."""
         action, begins = tensordict["action"], tensordict["step_count"] == 0
-        self.episode.add_(begins)
         normal = torch.randn_like(action)
+        anywhere = torch.special.ndtr(normal)
+        self.origin.copy_(torch.where(begins & (self.episode == 0), anywhere, self.origin))
+        self.episode.add_(begins)
         turned = PERSISTENCE * self.heading + (1.0 - PERSISTENCE**2) ** 0.5 * normal
-        share, part = (torch.frac(self.episode * multiple) for multiple in EVENLY)
+        share, part = torch.frac(self.origin + self.episode * self.multiples).split(1, dim=-1)
         angle = 2.0 * math.pi * part
         begun = math.sqrt(2.0) * torch.cat([angle.cos(), angle.sin()], dim=-1)
         self.heading.copy_(torch.where(begins, begun, turned))
