@@ -17,6 +17,7 @@ from hyuav import Scenario
 from hyuav.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
 from hyuav.schemes.linear import ja_lt, re_lt
 from hyuav.schemes.optimum import FlightPolicy, solve
+from recipe_calls import Call, Refusal
 
 RECIPES = Path(__file__).parents[1] / "recipes"
 
@@ -76,7 +77,7 @@ def evaluation(scenario: Scenario) -> Evaluation:
 
 
 @pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[..., None]]:
+def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Call]:
     """Run a recipe with arguments in an empty directory."""
 
     def run(name: str, *arguments: str) -> None:
@@ -92,3 +93,20 @@ def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[.
 
     yield run
     torch.set_num_threads(1)
+
+
+@pytest.fixture
+def refusal(call: Call, capsys: pytest.CaptureFixture[str]) -> Refusal:
+    """Run a recipe that refuses its arguments: its one line, and exit status 2."""
+
+    def run(name: str, *arguments: str) -> str:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stopped:
+            call(name, *arguments)
+        assert stopped.value.code == 2
+        errors = capsys.readouterr().err
+        assert "error: " in errors  # behind the program's name where the syntax is at fault
+        assert errors.count("\n") == 1
+        return errors
+
+    return run

@@ -1,5 +1,4 @@
 import dataclasses
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,6 +7,7 @@ from hyuav import Scenario
 from hyuav.dashboard import draft as drafts
 from hyuav.errors import InputError
 from hyuav.runs import RunDirectory
+from recipe_calls import TINY, Call
 
 SCENARIO = Scenario.preset("two_clusters")
 
@@ -75,9 +75,7 @@ def test_the_only_ue_stays() -> None:
         drafts.without_ue(draft, "UE 1")
 
 
-def test_a_saved_scenario_is_one_that_the_recipes_take(
-    call: Callable[..., None], tmp_path: Path
-) -> None:
+def test_a_saved_scenario_is_one_that_the_recipes_take(call: Call, tmp_path: Path) -> None:
     mine = dataclasses.replace(SCENARIO, jamming_power=0.5, noise_power=3e-14, fading=False)
     assert drafts.save(mine, tmp_path, "my-scenario").is_file()
     assert drafts.load(tmp_path, "my-scenario") == mine
@@ -85,11 +83,8 @@ def test_a_saved_scenario_is_one_that_the_recipes_take(
         "train",
         f"--config-dir={tmp_path}",
         "scenario=my-scenario",
-        "training.num_episodes=2",
-        "training.evaluation_episodes=2",
-        "algorithm.hidden_sizes=[8]",
-        "logger.mode=disabled",
         "hydra.run.dir=run",
+        *TINY,
     )
     trained = RunDirectory(tmp_path / "run").configuration()
     assert (trained.scenario_name, trained.scenario) == ("my-scenario", mine)

@@ -4,14 +4,12 @@ import socket
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from dashboard_server import RECIPES, dashboard
-
-Call = Callable[..., None]
+from recipe_calls import Refusal
 
 
 def test_it_serves_this_machine_alone_until_interrupted(tmp_path: Path) -> None:
@@ -57,19 +55,14 @@ def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_a_mistake_is_answered_by_one_line(
-    call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str], argument: str, line: str
+    refusal: Refusal, tmp_path: Path, argument: str, line: str
 ) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(SystemExit) as stopped:
-        call("dashboard", argument)
-    assert stopped.value.code == 2
-    errors = capsys.readouterr().err
-    assert line in errors
-    assert errors.count("\n") == 1
+    assert line in refusal("dashboard", argument)
 
 
 def test_without_streamlit_it_says_how_to_get_it(
-    call: Call, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = importlib.util.find_spec
 
@@ -77,7 +70,5 @@ def test_without_streamlit_it_says_how_to_get_it(
         return None if name == "streamlit" else found(name)
 
     monkeypatch.setattr(importlib.util, "find_spec", find)
-    with pytest.raises(SystemExit):
-        call("dashboard")
     expected = "error: streamlit cannot be imported: pip install 'hyuav[dashboard]'\n"
-    assert capsys.readouterr().err == expected
+    assert refusal("dashboard") == expected

@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -18,8 +17,7 @@ from hyuav.benchmark.tables import print_tables
 from hyuav.benchmark.work import Work
 from hyuav.errors import InputError
 from hyuav.recording import cores
-
-Call = Callable[..., None]
+from recipe_calls import Call, Refusal
 
 TINY = ["rounds=2", "seconds=0.05", "learners=2", "batches=[1,16]", "hydra.run.dir=run"]
 
@@ -149,30 +147,18 @@ REFUSALS = [
 
 @pytest.mark.parametrize(("arguments", "line"), REFUSALS, ids=[a[0] for a, _ in REFUSALS])
 def test_a_mistake_is_answered_by_one_line_and_status_2(
-    call: Call,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
-    line: str,
+    refusal: Refusal, tmp_path: Path, arguments: list[str], line: str
 ) -> None:
-    with pytest.raises(SystemExit) as stopped:
-        call("benchmark", *arguments)
-    errors = capsys.readouterr().err
-    assert stopped.value.code == 2
-    assert errors.count("\n") == 1
-    assert line in errors
+    assert line in refusal("benchmark", *arguments)
     assert not list(tmp_path.glob("runs/*"))
 
 
 def test_missing_libraries_are_named_with_the_way_to_get_them(
-    call: Call, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(plan, "_can_be_found", lambda library: library == "stable_baselines3")
-    with pytest.raises(SystemExit) as stopped:
-        call("benchmark", "parts=training")
-    assert stopped.value.code == 2
     line = "error: sbx, jax cannot be imported: pip install 'hyuav[bench]'\n"
-    assert capsys.readouterr().err == line
+    assert refusal("benchmark", "parts=training") == line
 
 
 def test_only_the_libraries_that_are_measured_are_needed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,6 @@
 """The comparison's recipe as a user calls it, at a size that is small enough for a test."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,24 +10,11 @@ import pytest
 from hyuav.benchmark import plan
 from hyuav.learning.algorithms import RobustDDPG
 from hyuav.runs import RunDirectory
+from recipe_calls import TINY_COMPARISON, Call, Refusal
 
-Call = Callable[..., None]
 Printed = pytest.CaptureFixture[str]
 
-TINY = [
-    "training.num_episodes=4",
-    "training.batch_size=8",
-    "training.evaluation_every=2",
-    "training.evaluation_episodes=3",
-    "training.compile=never",
-    "evaluation.episodes=4",
-    "evaluation.resolution=10",
-    "num_slots=8",
-    "learners=2",
-    "workers=1",
-    "output=here",
-]
-TWO = ["algorithm=[ddpg,sac]", "scenario=two_clusters", "scheme=[hybrid,relay]", *TINY]
+TWO = ["algorithm=[ddpg,sac]", "scenario=two_clusters", "scheme=[hybrid,relay]", *TINY_COMPARISON]
 SHARDS = {"ddpg_two_clusters_T8", "sac_two_clusters_T8"}
 
 
@@ -58,7 +44,12 @@ def test_a_comparison_trains_prints_keeps_and_draws(
     table = [line for line in printed.splitlines() if not line.startswith("comparison:")]
     assert max(map(len, table)) <= 80
     assert "…" not in printed
-    call("evaluate", "run=here/shards/sac_two_clusters_T8", *TINY[5:7])
+    call(
+        "evaluate",
+        "run=here/shards/sac_two_clusters_T8",
+        "evaluation.episodes=4",
+        "evaluation.resolution=10",
+    )
     evaluation = json.loads((here / "shards/sac_two_clusters_T8/evaluation.json").read_text())
     proposed = evaluation["schemes"]["proposed"]["secrecy_sum_rate"]["mean"]
     own = results[(results["algorithm"] == "sac") & (results["scheme"] == "hybrid")]
@@ -113,7 +104,7 @@ def test_shards_of_random_layouts_and_of_a_peer_train_in_processes(
 ) -> None:
     pytest.importorskip("stable_baselines3")
     entries = ["algorithm=[td3,stable_baselines3]", "scheme=jamming", "scenario=[]", "layouts=2"]
-    call("compare", *entries, *TINY, "learners=1", "workers=2")
+    call("compare", *entries, *TINY_COMPARISON, "learners=1", "workers=2")
     here = tmp_path / "here"
     layouts = [f"layout-{seed}" for seed in (1000, 1001)]
     configurations = [
@@ -136,7 +127,9 @@ def test_a_variant_is_compared_without_its_pieces(
     call: Call, tmp_path: Path, capsys: Printed
 ) -> None:
     pieces = ["algorithm=[ddpg,ddpg_robust]", "without=[clock,restart_after]"]
-    call("compare", *pieces, *TINY, "scenario=two_clusters", "scheme=relay", "learners=1")
+    call(
+        "compare", *pieces, *TINY_COMPARISON, "scenario=two_clusters", "scheme=relay", "learners=1"
+    )
     here = tmp_path / "here"
     entries = ["ddpg", "ddpg_robust", "ddpg_robust-clock", "ddpg_robust-restart_after"]
     assert pd.read_parquet(here / "results.parquet")["algorithm"].tolist() == entries
@@ -147,17 +140,11 @@ def test_a_variant_is_compared_without_its_pieces(
     assert "without restart after" in printed
 
 
-def test_a_directory_of_another_comparison_is_left_alone(
-    call: Call, tmp_path: Path, capsys: Printed
-) -> None:
+def test_a_directory_of_another_comparison_is_left_alone(refusal: Refusal, tmp_path: Path) -> None:
     (tmp_path / "here").mkdir()
     (tmp_path / "here" / "config.yaml").write_text("threshold: 0.5\n")
-    with pytest.raises(SystemExit) as stopped:
-        call("compare", *TWO)
-    assert stopped.value.code == 2
-    errors = capsys.readouterr().err
-    assert errors.count("\n") == 1
-    assert "here': expected a comparison with algorithm = ['ddpg', 'sac']" in errors
+    line = "here': expected a comparison with algorithm = ['ddpg', 'sac']"
+    assert line in refusal("compare", *TWO)
     assert [path.name for path in (tmp_path / "here").iterdir()] == ["config.yaml"]
 
 
@@ -185,23 +172,15 @@ REFUSALS = [
 
 @pytest.mark.parametrize(("arguments", "line"), REFUSALS, ids=[a[0] for a, _ in REFUSALS])
 def test_a_mistake_is_answered_by_one_line_and_status_2(
-    call: Call, tmp_path: Path, capsys: Printed, arguments: list[str], line: str
+    refusal: Refusal, tmp_path: Path, arguments: list[str], line: str
 ) -> None:
-    with pytest.raises(SystemExit) as stopped:
-        call("compare", *arguments)
-    errors = capsys.readouterr().err
-    assert stopped.value.code == 2
-    assert errors.count("\n") == 1
-    assert line in errors
+    assert line in refusal("compare", *arguments)
     assert not list(tmp_path.glob("runs/*"))
 
 
 def test_a_missing_library_is_named_with_the_way_to_get_it(
-    call: Call, monkeypatch: pytest.MonkeyPatch, capsys: Printed
+    refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(plan, "_can_be_found", lambda _: False)
-    with pytest.raises(SystemExit) as stopped:
-        call("compare", "algorithm=[ddpg,stable_baselines3]", *TINY)
-    assert stopped.value.code == 2
     line = "error: stable_baselines3 cannot be imported: pip install 'hyuav[bench]'\n"
-    assert capsys.readouterr().err == line
+    assert refusal("compare", "algorithm=[ddpg,stable_baselines3]", *TINY_COMPARISON) == line

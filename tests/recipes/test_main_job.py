@@ -1,7 +1,6 @@
 """The main job: over several layouts and horizons, and at its full length."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -10,26 +9,22 @@ import pytest
 from hyuav.figures.gallery import FIGURES
 from hyuav.runs import RunDirectory
 from hyuav.scenario import PRESETS
+from recipe_calls import TINY, Call, Refusal
 
-TINY = [
-    "training.num_episodes=4",
-    "training.batch_size=8",
-    "training.evaluation_every=2",
-    "training.evaluation_episodes=3",
-    "algorithm.hidden_sizes=[8]",
+JOB = [
+    *TINY,
     "candidates=1",
     "evaluation.episodes=4",
     "evaluation.resolution=5",
     "scenario.num_slots=8",
-    "logger.mode=disabled",
     "hydra.run.dir=job",
 ]
 
 
 def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
-    call: Callable[..., None], tmp_path: Path
+    call: Call, tmp_path: Path
 ) -> None:
-    call("reproduce", "seeds=2", "num_slots=[8,10]", "also=random_disk", *TINY)
+    call("reproduce", "seeds=2", "num_slots=[8,10]", "also=random_disk", *JOB)
     job = tmp_path / "job"
     learners = RunDirectory(job).configuration().learners
     assert [own.num_slots for own in learners] == [8] * 6 + [10] * 6
@@ -63,23 +58,14 @@ def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
     ],
 )
 def test_what_cannot_be_drawn_is_refused_before_any_training(
-    call: Callable[..., None],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
-    line: str,
+    refusal: Refusal, tmp_path: Path, arguments: list[str], line: str
 ) -> None:
-    with pytest.raises(SystemExit) as stopped:
-        call("reproduce", *arguments, *TINY)
-    assert stopped.value.code == 2
-    assert line in capsys.readouterr().err
+    assert line in refusal("reproduce", *arguments, *JOB)
     assert not (tmp_path / "job").exists()
 
 
 @pytest.mark.slow
-def test_the_main_job_finds_what_the_paper_reports(
-    call: Callable[..., None], tmp_path: Path
-) -> None:
+def test_the_main_job_finds_what_the_paper_reports(call: Call, tmp_path: Path) -> None:
     """The order of the schemes, the distance to the optimum, and relaying before jamming."""
     call("reproduce", "hydra.run.dir=job", "logger.mode=disabled")
     schemes = json.loads((tmp_path / "job" / "evaluation.json").read_text())["schemes"]

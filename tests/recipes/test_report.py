@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from hyuav.runs import RunDirectory
+from recipe_calls import Call, Refusal
 
 pytest_plugins = "sample_runs"
 
-Call = Callable[..., None]
 Copy = Callable[[RunDirectory], RunDirectory]
 Printed = pytest.CaptureFixture[str]
 
@@ -33,9 +33,5 @@ def test_reports_of_several_directories_are_written_anew(
         (["run=none"], "error: run = 'none': expected an existing directory"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(
-    arguments: list[str], line: str, call: Call, capsys: Printed
-) -> None:
-    with pytest.raises(SystemExit):
-        call("report", *arguments)
-    assert capsys.readouterr().err.strip() == line
+def test_a_mistake_is_told_in_one_line(arguments: list[str], line: str, refusal: Refusal) -> None:
+    assert refusal("report", *arguments) == f"{line}\n"

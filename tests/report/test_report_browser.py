@@ -14,6 +14,7 @@ from hyuav.evaluation import LABELS
 from hyuav.report.page import write_report
 from hyuav.report.reading import readable_flights
 from hyuav.runs import METRIC_COLUMNS, RunDirectory
+from recipe_calls import TINY_COMPARISON, Call
 
 pytest_plugins = "sample_runs"
 pytestmark = needs_chromium
@@ -202,14 +203,9 @@ def test_an_empty_directory_opens(folder: str, tmp_path: Path) -> None:
         assert len(notes) == page.locator("h2").count()
 
 
-def test_a_comparison_opens(call: Callable[..., None], tmp_path: Path) -> None:
-    tiny = {"num_episodes": 4, "batch_size": 8, "evaluation_every": 2, "evaluation_episodes": 3}
-    call(
-        *("compare", "algorithm=[ddpg,sac]", "scenario=two_clusters", "scheme=[hybrid,relay]"),
-        *(f"training.{name}={value}" for name, value in tiny.items()),
-        *("training.compile=never", "evaluation.episodes=4", "evaluation.resolution=10"),
-        *("num_slots=8", "learners=2", "workers=1", "output=here"),
-    )
+def test_a_comparison_opens(call: Call, tmp_path: Path) -> None:
+    asked = ("algorithm=[ddpg,sac]", "scenario=two_clusters", "scheme=[hybrid,relay]")
+    call("compare", *asked, *TINY_COMPARISON)
     here = tmp_path / "here"
     for screen in (DESKTOP, PHONE):
         with opened(here / "report.html", screen) as page:

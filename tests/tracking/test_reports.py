@@ -1,7 +1,6 @@
 import dataclasses
 import io
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.schemes.linear import re_lt
 from hyuav.tracking import EvaluationLoggerParameters, LoggerParameters, log_evaluation
 from offline_wandb import history, offline_runs, recorded, summary
+from recipe_calls import TINY_COMPARISON, Call
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
 CONFIGURATION = RunConfiguration(
@@ -83,25 +83,15 @@ def test_an_evaluation_of_a_training_that_was_not_logged_is_not_logged(tmp_path:
 
 
 def test_the_trainings_of_a_comparison_are_a_group_and_it_is_one_of_them(
-    call: Callable[..., None], tmp_path: Path
+    call: Call, tmp_path: Path
 ) -> None:
     call(
         "compare",
         "algorithm=[ddpg,sac]",
         "scenario=two_clusters",
         "scheme=relay",
-        "training.num_episodes=2",
-        "training.batch_size=8",
-        "training.evaluation_every=1",
-        "training.evaluation_episodes=3",
-        "training.compile=never",
-        "evaluation.episodes=4",
-        "evaluation.resolution=10",
-        "num_slots=8",
-        "learners=2",
-        "workers=1",
-        "output=here",
         "logger.mode=offline",
+        *TINY_COMPARISON,
     )
     runs = [recorded(file, "run")[0] for file in offline_runs(tmp_path / "here")]
     assert {(run.display_name, run.job_type) for run in runs} == {

@@ -18,18 +18,11 @@ from wandb.sdk.launch.sweeps.utils import (
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.runs import RunDirectory
 from offline_wandb import offline_runs, recorded, summary
+from recipe_calls import TINY
 
 ROOT = Path(__file__).parents[2]
 SWEEPS = sorted((ROOT / "sweeps").glob("*.yaml"))
-TINY = [
-    "training.num_episodes=2",
-    "training.batch_size=8",
-    "training.evaluation_episodes=3",
-    "algorithm.hidden_sizes=[8]",
-    "scenario.num_slots=4",
-    "learners=1",
-    "logger.mode=offline",
-]
+SHORT = [*TINY, "scenario.num_slots=4", "learners=1", "logger.mode=offline"]
 
 FIELDS = {
     "uniform": {"min", "max"},
@@ -97,7 +90,7 @@ def test_what_an_agent_would_call_trains_and_reports_what_the_sweep_goes_by(
     (tmp_path / "recipes").symlink_to(ROOT / "recipes")
     words = command(config, np.random.default_rng(1))
     identity = {"WANDB_SWEEP_ID": "sweep1", "WANDB_RUN_ID": "drawn1"}
-    subprocess.run([*words, *TINY], cwd=tmp_path, env=os.environ | identity, check=True)
+    subprocess.run([*words, *SHORT], cwd=tmp_path, env=os.environ | identity, check=True)
     directory = tmp_path / "runs" / "sweep_sweep1" / "drawn1"
     drawn = dict(word.split("=") for word in words if word.startswith("algorithm."))
     algorithm = RunDirectory(directory).configuration().algorithm.to_dict()
