@@ -16,7 +16,7 @@ from hyuav.configuration import Config, recipe, section
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EvaluationParameters, evaluate
 from hyuav.experiment import learned_policies, print_results, reference_policies
-from hyuav.figures import flight_map, save_figure
+from hyuav.figures import save_flight_map
 from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text
 from hyuav.report.page import write_run_report
 from hyuav.runs import RunDirectory, require_writable
@@ -69,7 +69,7 @@ def main(config: Config, _: Path) -> None:
     }
     evaluation = evaluate(scenario, first.scenario_name, policies, parameters, options.device)
     evaluation.save(output)
-    save_figure(flight_map(scenario, evaluation.flights), output / "figures", "flight_map")
+    save_flight_map(scenario, evaluation.flights, output / "figures")
     print_results(evaluation, console)
     report = write_run_report(output)
     log_evaluation(output, evaluation, runs, logger, console)

@@ -110,7 +110,8 @@ def test_saved_runs_are_evaluated_offline(
         *("optimum", "re_optimum", "ja_optimum"),
     }
     assert (tmp_path / "together" / "flights.parquet").exists()
-    assert (tmp_path / "together" / "figures" / "flight_map.pdf").exists()
+    drawn = {path.name for path in (tmp_path / "together" / "figures").iterdir()}
+    assert drawn == {f"flight_map{end}" for end in (".pdf", ".png", ".csv", "_nodes.csv")}
     call("evaluate", "run=hybrid", *few)
     assert json.loads((tmp_path / "hybrid" / "evaluation.json").read_text())["episodes"] == 5
     printed = capsys.readouterr().out

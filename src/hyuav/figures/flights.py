@@ -1,6 +1,7 @@
 """Flights over the map: the paper's Fig. 3, and every scheme over its own optimum."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR, draw_flight, draw_scenario, mode_handles
 from hyuav.evaluation import LABELS
-from hyuav.figures.style import COLORS, COLUMN_WIDTH, PAGE_WIDTH, STYLE
+from hyuav.figures.style import COLORS, COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
 from hyuav.scenario import Scenario
 
 FLOWN_BY_LEARNING = {"ja_ot": 2.4, "re_ot": 1.7, "proposed": 1.0}
@@ -110,6 +111,22 @@ def flight_map(scenario: Scenario, flights: pd.DataFrame) -> Figure:
             columnspacing=1.4,
         )
         return figure
+
+
+def save_flight_map(
+    scenario: Scenario, flights: pd.DataFrame, directory: Path, name: str = "flight_map"
+) -> None:
+    """Write :func:`flight_map` with what it shows beside it.
+
+    Args:
+        scenario: that was flown.
+        flights: a row per slot, as in :attr:`Evaluation.flights`.
+        directory: for the files.
+        name: of the figure.
+    """
+    schemes = [scheme for optimum, over in FLIGHT_PANELS.items() for scheme in (optimum, *over)]
+    tables = flight_tables(scenario, flights, schemes)
+    save_figure(flight_map(scenario, flights), directory, name, tables)
 
 
 def flight_tables(

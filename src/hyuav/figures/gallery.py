@@ -16,11 +16,10 @@ from hyuav.experiment import LEARNED
 from hyuav.figures.animation import animate_flight
 from hyuav.figures.curves import learning_curves, learning_table
 from hyuav.figures.flights import (
-    FLIGHT_PANELS,
     FLOWN_BY_LEARNING,
     first_flight,
-    flight_map,
     flight_tables,
+    save_flight_map,
     trajectories,
 )
 from hyuav.figures.horizons import horizon_table, sum_rates_by_horizon
@@ -168,10 +167,7 @@ def _horizons(finished: Finished, directory: Path, name: str) -> None:
 
 
 def _flight_map(finished: Finished, directory: Path, name: str) -> None:
-    scenario, flights = finished.flown, finished.flights
-    schemes = [name for optimum, over in FLIGHT_PANELS.items() for name in (optimum, *over)]
-    tables = flight_tables(scenario, flights, schemes)
-    save_figure(flight_map(scenario, flights), directory, name, tables)
+    save_flight_map(finished.flown, finished.flights, directory, name)
 
 
 def _sum_rate_maps(finished: Finished, directory: Path, name: str) -> None:
