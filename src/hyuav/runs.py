@@ -2,7 +2,6 @@
 
 import csv
 import dataclasses
-import io
 import tempfile
 from collections import Counter
 from collections.abc import Mapping
@@ -19,6 +18,7 @@ from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
+from hyuav.metrics import IDENTITY, parse_rows
 from hyuav.parameters import read_yaml, sequence
 from hyuav.scenario import PRESETS, Scenario
 
@@ -227,7 +227,7 @@ def readable_metrics(path: str | Path) -> pd.DataFrame:
     """What can be read of a ``metrics.csv``, also while it is being written.
 
     A file that is missing or empty has no rows; a row cut off in the middle, or damaged, is left
-    out. Every column of :data:`METRIC_COLUMNS` is there, all numbers but ``scheme``.
+    out. Every column of :data:`METRIC_COLUMNS` is there, all finite or NaN but ``scheme``.
 
     Args:
         path: of the file.
@@ -236,26 +236,11 @@ def readable_metrics(path: str | Path) -> pd.DataFrame:
         content = Path(path).read_bytes()
     except OSError:
         content = b""
-    whole = content[: content.rfind(b"\n") + 1].replace(b"\0", b"")
-    try:
-        table = pd.read_csv(
-            io.BytesIO(whole),
-            dtype=str,
-            on_bad_lines="skip",
-            encoding_errors="replace",
-            quoting=csv.QUOTE_NONE,
-        )
-    except ValueError:  # nothing in it, or no table
-        table = pd.DataFrame()
-    columns = dict.fromkeys([*METRIC_COLUMNS, *table.columns])
-    numbers = {
-        name: pd.to_numeric(table.get(name, pd.Series(dtype=float)), errors="coerce")
-        for name in columns
-        if name != "scheme"
-    }
-    scheme = table.get("scheme", pd.Series(dtype=str))
-    rows = pd.DataFrame(numbers).assign(scheme=scheme)[list(columns)]
-    return rows.dropna(subset=["episode", "learner", "scheme"]).reset_index(drop=True)
+    header, _, lines = content[: content.rfind(b"\n") + 1].partition(b"\n")
+    columns = header.decode("utf-8", "replace").strip().split(",")
+    told = set(IDENTITY) <= set(columns)
+    rows = parse_rows(lines, columns) if told else parse_rows(b"", METRIC_COLUMNS)
+    return rows.reindex(columns=list(dict.fromkeys([*METRIC_COLUMNS, *rows.columns])))
 
 
 class MetricsFile:

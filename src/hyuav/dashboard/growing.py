@@ -1,14 +1,12 @@
 """Reading ``metrics.csv`` again and again while a training writes it."""
 
-import csv
-import io
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
 import pandas as pd
 
 from hyuav.errors import InputError, rejection
+from hyuav.metrics import parse_rows
 
 NEEDED = ("episode", "slots", "learner", "scheme", "num_slots")
 """Columns without which there is nothing to draw."""
@@ -68,7 +66,9 @@ class GrowingMetrics:
             header, _, lines = lines.partition(b"\n")
             self._columns = require_columns(self.path, header)
         if lines:
-            self._rows = pd.concat([self._rows, parse(lines, self._columns)], ignore_index=True)
+            self._rows = pd.concat(
+                [self._rows, parse_rows(lines, self._columns)], ignore_index=True
+            )
 
 
 def require_columns(path: Path, header: bytes) -> list[str]:
@@ -83,26 +83,3 @@ def require_columns(path: Path, header: bytes) -> list[str]:
         accepted = f"columns that differ, among them {', '.join(NEEDED)}"
         raise InputError(rejection(f"{path.name} header", header[:80], accepted))
     return columns
-
-
-def parse(lines: bytes, columns: list[str]) -> pd.DataFrame:
-    """Rows from whole lines; what is no finite number is NaN, rows without an episode are left out.
-
-    Args:
-        lines: each with its end of line.
-        columns: of the table.
-    """
-    rows = pd.read_csv(
-        io.BytesIO(lines),
-        names=columns,
-        index_col=False,
-        on_bad_lines="skip",
-        encoding_errors="replace",
-        quoting=csv.QUOTE_NONE,
-        dtype={"scheme": str},
-        low_memory=False,
-    )
-    for name in rows.columns.drop("scheme"):
-        numbers = pd.to_numeric(rows[name], errors="coerce").astype("float64")
-        rows[name] = numbers.where(np.isfinite(numbers))
-    return rows.dropna(subset=["episode", "learner", "scheme"])

@@ -12,9 +12,10 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from hyuav.dashboard.growing import GrowingMetrics, parse, require_columns
+from hyuav.dashboard.growing import GrowingMetrics, require_columns
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EVALUATION_FILE, OPTIMA
+from hyuav.metrics import parse_rows
 from hyuav.runs import RunDirectory
 
 RUNNING_SECONDS = 120.0
@@ -282,6 +283,6 @@ def _last_rows(path: Path, learners: int, evaluation_every: object) -> pd.DataFr
     if not lines:
         return pd.DataFrame()
     try:
-        return parse(lines, require_columns(path, header))
+        return parse_rows(lines, require_columns(path, header))
     except InputError:
         return pd.DataFrame()
