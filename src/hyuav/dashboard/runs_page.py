@@ -51,11 +51,12 @@ def _page(index: RunIndex) -> None:
     st.dataframe(_listing(found, now), hide_index=True, height=height, column_config=_columns())
     chosen = _chosen(entries, found)
     metrics: dict[str, pd.DataFrame] = {}
-    for entry in chosen:
-        with refusals():
-            metrics[entry.name] = index.metrics(entry.name)
-    for entry in chosen:
-        _progress(entry, now)
+    with st.container():  # what comes and goes in here moves no widget below, which would lose keys
+        for entry in chosen:
+            with refusals():
+                metrics[entry.name] = index.metrics(entry.name)
+        for entry in chosen:
+            _progress(entry, now)
     if metrics:
         _drawn(index, metrics)
 
@@ -167,9 +168,10 @@ def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
     """The figure with its controls, and the tables below it."""
     choice = _choice(metrics)
     optima: dict[str, Mapping[str, float]] = {}
-    for name in metrics:
-        with refusals():
-            optima[name] = index.optima(name)
+    with st.container():
+        for name in metrics:
+            with refusals():
+                optima[name] = index.optima(name)
     figure = comparison(metrics, optima, choice)
     if not figure.data:
         st.info("No episode of this quantity is complete yet.")
