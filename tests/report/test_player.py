@@ -6,7 +6,8 @@ import pandas as pd
 import pytest
 
 from hyuav import InputError, Scenario
-from hyuav.report.player import LINKS, flight_player
+from hyuav.report.player import flight_player
+from hyuav.report.player_map import LINKS
 from hyuav.report.reading import readable_flights
 from hyuav.runs import RunDirectory
 
