@@ -68,7 +68,7 @@ def test_curves_are_smoothed_over_episodes_and_drawn_against_slots() -> None:
 def test_the_optimum_bounds_returns_and_not_losses() -> None:
     run = {"run": metrics(ramp(3, 1))}
     bounded = comparison(run, {"run": {"hybrid": 59.0}}, PLAIN)
-    assert [shape.y0 for shape in bounded.layout.shapes] == [59.0]
+    assert [(shape.y0, shape.name) for shape in bounded.layout.shapes] == [(59.0, "Optimum")]
     losses = comparison(run, {"run": {"hybrid": 59.0}}, Choice(y="loss_critic"))
     assert not losses.layout.shapes
     assert losses.layout.yaxis.title.text == "Loss of the critic"

@@ -81,11 +81,13 @@ def test_the_newest_run_is_drawn_and_any_can_be_compared(write: WriteRun, tmp_pa
     for name in ("one", "two", "three"):
         write(name, 6)
     page = opened(_runs, tmp_path / "runs")
-    assert len(page.multiselect(key="drawn").value) == 1
-    page.multiselect(key="drawn").set_value(["one", "three"]).run()
+    assert len(widget(page, "multiselect", "Runs to draw").value) == 1
+    widget(page, "multiselect", "Runs to draw").set_value(["one", "three"]).run()
     assert set(page.dataframe[1].value["Run"]) == {"one", "three"}
     next(button for button in page.button if button.label == "Draw all 3").click().run()
     assert set(page.dataframe[1].value["Run"]) == {"one", "two", "three"}
+    widget(page, "multiselect", "Runs to draw").set_value(["two"]).run()
+    assert set(page.dataframe[1].value["Run"]) == {"two"}
     assert errors(page) == []
 
 
@@ -109,7 +111,7 @@ def test_what_sets_runs_apart_is_told(write: WriteRun, tmp_path: Path) -> None:
     write("one", 2, num_episodes=10)
     write("two", 2, num_episodes=20)
     page = opened(_runs, tmp_path / "runs")
-    page.multiselect(key="drawn").set_value(["one", "two"]).run()
+    widget(page, "multiselect", "Runs to draw").set_value(["one", "two"]).run()
     table = page.dataframe[2].value
     assert list(table.loc["training.num_episodes"]) == ["10", "20"]
     assert len(table) == 1

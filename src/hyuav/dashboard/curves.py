@@ -9,6 +9,7 @@ import pandas as pd
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from hyuav.evaluation import OPTIMA
 from hyuav.experiment import LEARNED
 from hyuav.intervals import interquartile_mean
 from hyuav.report.style import axis, base_layout, plain, scheme_color, scheme_label
@@ -146,8 +147,12 @@ def comparison(
             figure.add_traces(list(_traces(curves, line, several_runs=len(metrics) > 1)))
             optimum = optima.get(run, {}).get(curves.scheme)
             if optimum is not None and choice.y in OF_THE_RETURN and not curves.several_horizons:
+                label = scheme_label(OPTIMA[curves.scheme])
                 figure.add_hline(
-                    y=optimum, line={"color": line["color"], "width": 1, "dash": "dot"}
+                    y=optimum,
+                    line={"color": line["color"], "width": 1, "dash": "dot"},
+                    name=f"{label}, {plain(run)}" if len(metrics) > 1 else label,
+                    showlegend=True,
                 )
     figure.update_layout(
         **base_layout(),

@@ -166,6 +166,7 @@ def _pilot(index: RunIndex, rule: str) -> Checkpoint | None:
     first, second = st.columns(2)
     name = first.selectbox("Fly the checkpoint of", options, key="pilot")
     if name == NOBODY:
+        second.selectbox("Learner", [], placeholder="of a checkpoint", disabled=True)
         return None
     with refusals():
         configuration = index.run(name).configuration()
@@ -175,7 +176,7 @@ def _pilot(index: RunIndex, rule: str) -> Checkpoint | None:
             if learner.scheme == rule
         }
         if not labels:
-            second.caption(f"No learner of this run was trained with {rule} modes.")
+            second.selectbox("Learner", [], placeholder=f"none for {rule}", disabled=True)
             return None
         if st.session_state.get("pilot_learner") not in labels:
             st.session_state["pilot_learner"] = next(iter(labels))

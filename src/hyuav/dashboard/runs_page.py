@@ -14,7 +14,7 @@ from hyuav.dashboard.tables import differences, outcomes
 from hyuav.errors import InputError
 
 KEPT = (
-    *("search", "scenarios", "algorithms", "schemes", "states", "drawn"),
+    *("search", "scenarios", "algorithms", "schemes", "states"),
     *("quantity", "against", "colors"),
 )
 """Widgets that keep their values while another page is shown."""
@@ -136,10 +136,12 @@ def _episodes(entry: RunEntry) -> str:
 def _chosen(entries: Sequence[RunEntry], found: Sequence[RunEntry]) -> list[RunEntry]:
     """The runs to draw: the newest at first, and then what a person chooses."""
     by_name = {entry.name: entry for entry in entries}
-    kept = [name for name in st.session_state.get("drawn", []) if name in by_name]
-    if "drawn" not in st.session_state and found:
-        kept = [found[0].name]
-    _keep("drawn", kept)
+    state = st.session_state
+    if "drawn" not in state and found:
+        state["drawn"] = [found[0].name]
+    key = f"drawn-{state.get('drawings', 0)}"
+    kept = [name for name in state.get(key, state.get("drawn", [])) if name in by_name]
+    _keep(key, kept)
     options = list(dict.fromkeys([*kept, *(entry.name for entry in found)]))
     choice, everything = st.columns([4, 1], vertical_alignment="bottom")
     everything.button(
@@ -150,12 +152,15 @@ def _chosen(entries: Sequence[RunEntry], found: Sequence[RunEntry]) -> list[RunE
         help=f"possible for up to {MOST_DRAWN} runs",
         width="stretch",
     )
-    names = choice.multiselect("Runs to draw", options, key="drawn", max_selections=MOST_DRAWN)
+    names = choice.multiselect("Runs to draw", options, key=key, max_selections=MOST_DRAWN)
+    state["drawn"] = names
     return [by_name[name] for name in names]
 
 
 def _draw(names: list[str]) -> None:
-    st.session_state["drawn"] = names
+    """Choose these in a new widget: of the former one, a browser may just be sending the value."""
+    state = st.session_state
+    state["drawn"], state["drawings"] = names, state.get("drawings", 0) + 1
 
 
 def _progress(entry: RunEntry, now: float) -> None:

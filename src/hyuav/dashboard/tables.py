@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from hyuav.dashboard.curves import Choice, learned_label
+from hyuav.dashboard.curves import OF_THE_RETURN, Choice, learned_label
 
 LAST_EPISODES = 50
 """Over which what a run reached last is averaged."""
@@ -21,6 +21,7 @@ def outcomes(metrics: Mapping[str, pd.DataFrame], choice: Choice) -> pd.DataFram
         choice: of the quantity.
     """
     rows = []
+    unit = " (bps/Hz)" if choice.y in OF_THE_RETURN else ""
     for run, table in metrics.items():
         if choice.y not in table.columns:
             continue
@@ -35,9 +36,9 @@ def outcomes(metrics: Mapping[str, pd.DataFrame], choice: Choice) -> pd.DataFram
                     "T": int(learners["num_slots"].iloc[0]),
                     "Learners": len(means),
                     "Episode": int(learners["episode"].max()),
-                    f"Mean of the last {LAST_EPISODES} episodes": means.mean(),
-                    "Best learner": means.max(),
-                    "Worst learner": means.min(),
+                    f"Last {LAST_EPISODES} episodes, mean{unit}": means.mean(),
+                    f"Best learner{unit}": means.max(),
+                    f"Worst learner{unit}": means.min(),
                 }
             )
     return pd.DataFrame(rows).round(3)
