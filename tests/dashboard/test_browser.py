@@ -13,12 +13,21 @@ from dashboard_runs import write_run
 from dashboard_server import dashboard, recipe
 from hyuav.dashboard.draft import load
 
-pytestmark = [needs_chromium, pytest.mark.slow]
+pytestmark = needs_chromium
 
 LONG = 100_000
 """Logged points of the longest run."""
 
-WIDTHS = pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+SIZES = {"desktop": DESKTOP, "phone": PHONE}
+
+
+def on(*quick: str) -> pytest.MarkDecorator:
+    """On a screen of each size; in the quick suite, only on those that are named."""
+    each = [
+        pytest.param(size, id=name, marks=[] if name in quick else pytest.mark.slow)
+        for name, size in SIZES.items()
+    ]
+    return pytest.mark.parametrize("size", each)
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +66,11 @@ def opened(context: BrowserContext, address: str, size: tuple[int, int]) -> Iter
         assert opened.refused == []
 
 
+def rest(page: Page) -> None:
+    """Wait until all is drawn that was asked for; trainings that are followed leave a moment."""
+    page.locator("[data-test-script-state=notRunning]").wait_for()
+
+
 def go_to(page: Page, title: str) -> None:
     page.get_by_role("radio", name=title).or_(page.get_by_role("button", name=title)).first.click()
     expect(page.get_by_role("heading", name=title)).to_be_visible()
@@ -70,7 +84,7 @@ def choose(page: Page, label: str, option: str) -> None:
     page.get_by_role("option", name=option, exact=True).first.click()
 
 
-@WIDTHS
+@on("desktop")
 def test_runs_are_found_and_compared_and_their_curves_changed(opened: BrowserPage) -> None:
     page = opened.page
     page.get_by_role("textbox", name="Search").fill("cut")
@@ -85,13 +99,16 @@ def test_runs_are_found_and_compared_and_their_curves_changed(opened: BrowserPag
     choose(page, "Quantity", "Best noise-free return so far (bps/Hz)")
     title = page.locator(".js-plotly-plot .ytitle").filter(has_text="Best noise-free")
     expect(title.first).to_be_visible()
+    page.get_by_text("Follow trainings in progress").click()
+    expect(page.get_by_label("Follow trainings in progress")).not_to_be_checked()
+    rest(page)  # or a renewal could come between the focus and the key
     smoothing = page.get_by_role("slider")
     smoothing.press("ArrowRight")
     expect(smoothing).to_have_value("26")
     expect(page.get_by_role("heading", name="What sets these runs apart")).to_be_visible()
 
 
-@WIDTHS
+@on("phone")
 def test_a_flight_is_played_by_the_slider(opened: BrowserPage, size: tuple[int, int]) -> None:
     page = opened.page
     go_to(page, "Flights")
@@ -111,7 +128,7 @@ def test_a_flight_is_played_by_the_slider(opened: BrowserPage, size: tuple[int, 
     expect(plot.locator(".gtitle")).to_have_count(1)  # the former flight has gone
 
 
-@WIDTHS
+@on()
 def test_a_scenario_is_changed_flown_and_saved(
     opened: BrowserPage, runs: Path, size: tuple[int, int]
 ) -> None:
@@ -154,7 +171,7 @@ def test_a_scenario_is_changed_flown_and_saved(
     assert 40.0 <= saved.eavesdropper_position[1] <= 60.0
 
 
-@WIDTHS
+@on()
 def test_an_empty_directory_is_followed_from_the_first_episode(
     context: BrowserContext, size: tuple[int, int], tmp_path: Path
 ) -> None:
