@@ -1,6 +1,7 @@
 import io
 import json
 import socket
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -135,12 +136,17 @@ def test_nothing_of_the_user_or_the_machine_is_written_down(home: Path) -> None:
     for artifact in artifacts:
         (entry,) = artifact.manifest.contents
         assert Path(entry.local_path).is_file()
+    (run,) = recorded(file, "run")
+    assert run.host == "not-recorded"
+    kept = {path.name for path in directory.rglob("*")}
+    assert "debug.log" in kept  # looked through below
+    assert "wandb-metadata.json" not in kept
     assert told_of(home) == []
 
 
 def told_of(home: Path) -> list[tuple[str, str]]:
-    """Where the files and links below the directory of work name the user or the machine."""
-    secrets = (KEY, home.name, "somebody-known", "a-machine-at-home")
+    """Where files and links below the directory of work name the user, the machine or Python's."""
+    secrets = (KEY, home.name, "somebody-known", "a-machine-at-home", sys.prefix)
     found = []
     for path in (home / "work").rglob("*"):
         if path.is_symlink():
