@@ -13,21 +13,12 @@ from dashboard_runs import write_run
 from dashboard_server import dashboard, recipe
 from hyuav.dashboard.draft import load
 
-pytestmark = needs_chromium
+pytestmark = [needs_chromium, pytest.mark.slow]
 
 LONG = 100_000
 """Logged points of the longest run."""
 
-SIZES = {"desktop": DESKTOP, "phone": PHONE}
-
-
-def on(*quick: str) -> pytest.MarkDecorator:
-    """On a screen of each size; in the quick suite, only on those that are named."""
-    each = [
-        pytest.param(size, id=name, marks=[] if name in quick else pytest.mark.slow)
-        for name, size in SIZES.items()
-    ]
-    return pytest.mark.parametrize("size", each)
+WIDTHS = pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +75,7 @@ def choose(page: Page, label: str, option: str) -> None:
     page.get_by_role("option", name=option, exact=True).first.click()
 
 
-@on("desktop")
+@WIDTHS
 def test_runs_are_found_and_compared_and_their_curves_changed(opened: BrowserPage) -> None:
     page = opened.page
     page.get_by_role("textbox", name="Search").fill("cut")
@@ -100,7 +91,7 @@ def test_runs_are_found_and_compared_and_their_curves_changed(opened: BrowserPag
     title = page.locator(".js-plotly-plot .ytitle").filter(has_text="Best noise-free")
     expect(title.first).to_be_visible()
     page.get_by_text("Follow trainings in progress").click()
-    expect(page.get_by_label("Follow trainings in progress")).not_to_be_checked()
+    expect(page.get_by_role("switch")).not_to_be_checked()
     rest(page)  # or a renewal could come between the focus and the key
     smoothing = page.get_by_role("slider")
     smoothing.press("ArrowRight")
@@ -108,7 +99,7 @@ def test_runs_are_found_and_compared_and_their_curves_changed(opened: BrowserPag
     expect(page.get_by_role("heading", name="What sets these runs apart")).to_be_visible()
 
 
-@on("phone")
+@WIDTHS
 def test_a_flight_is_played_by_the_slider(opened: BrowserPage, size: tuple[int, int]) -> None:
     page = opened.page
     go_to(page, "Flights")
@@ -128,7 +119,7 @@ def test_a_flight_is_played_by_the_slider(opened: BrowserPage, size: tuple[int, 
     expect(plot.locator(".gtitle")).to_have_count(1)  # the former flight has gone
 
 
-@on()
+@WIDTHS
 def test_a_scenario_is_changed_flown_and_saved(
     opened: BrowserPage, runs: Path, size: tuple[int, int]
 ) -> None:
@@ -171,7 +162,7 @@ def test_a_scenario_is_changed_flown_and_saved(
     assert 40.0 <= saved.eavesdropper_position[1] <= 60.0
 
 
-@on()
+@WIDTHS
 def test_an_empty_directory_is_followed_from_the_first_episode(
     context: BrowserContext, size: tuple[int, int], tmp_path: Path
 ) -> None:
