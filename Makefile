@@ -7,7 +7,8 @@ FIGURES := also=random_disk
 QUICK := seeds=2 num_slots=[10,15,20] training.num_episodes=120 candidates=2 \
 	candidate_episodes=20 evaluation.episodes=200 evaluation.resolution=2
 
-.PHONY: help setup reproduce figures figures-quick dashboard test test-slow lint format clean
+.PHONY: help setup reproduce figures figures-quick dashboard test test-slow lint format docs dist \
+	clean
 
 help: ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -37,14 +38,26 @@ test: setup ## run the tests
 test-slow: setup ## run the learning checks that take minutes
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
-lint: setup ## check style, formatting and types
+lint: setup ## check style, formatting, types, docstrings and dependencies
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/interrogate --quiet src
+	$(BIN)/deptry .
 	$(BIN)/mypy
 
 format: setup ## format the code
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: setup ## build the documentation into build/site, strictly and without a network
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir build/site
+
+dist: setup ## build wheel and sdist, and try the wheel in an empty environment
+	rm -rf dist build/empty
+	$(BIN)/python -m build
+	$(PYTHON) -m venv build/empty
+	build/empty/bin/python -m pip install --quiet --constraint constraints.txt dist/*.whl
+	cd build && empty/bin/python -I ../examples/first_training.py
 
 clean: ## remove what the other commands made, runs excepted
 	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

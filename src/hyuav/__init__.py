@@ -1,16 +1,39 @@
 """Reinforcement learning for UAV-enabled secure offloading with a hybrid relay and jammer."""
 
+import os
+
 import gymnasium
 
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.envs.transforms import make_env
 from hyuav.errors import InputError, InputTypeError
+from hyuav.learning.algorithms import DDPG, SAC, TD3, RobustDDPG, RobustTD3
+from hyuav.learning.algorithms.registry import OWN_FILES, register, run_own_files
+from hyuav.learning.cohort import Learner
+from hyuav.learning.training import Training, TrainingParameters
 from hyuav.scenario import Scenario
 
-__all__ = ["InputError", "InputTypeError", "Scenario", "SecureOffloadingEnv", "make_env"]
+__all__ = [
+    "DDPG",
+    "SAC",
+    "TD3",
+    "InputError",
+    "InputTypeError",
+    "Learner",
+    "RobustDDPG",
+    "RobustTD3",
+    "Scenario",
+    "SecureOffloadingEnv",
+    "Training",
+    "TrainingParameters",
+    "make_env",
+    "register",
+]
 
 gymnasium.register(
     "hyuav/SecureOffloading-v0",
     entry_point="hyuav.envs.gymnasium:SecureOffloadingGymEnv",
     vector_entry_point="hyuav.envs.gymnasium:SecureOffloadingVectorEnv",
 )
+
+run_own_files(os.environ.get(OWN_FILES, ""))  # last: they import from above

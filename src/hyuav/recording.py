@@ -91,7 +91,7 @@ def compile_function(
         inputs: examples of what it takes.
 
     Raises:
-        One of :data:`COMPILATION_ERRORS`.
+        Exception: one of :data:`COMPILATION_ERRORS`.
     """
     graph, tensors = record(function, inputs)
     on_cpu = all(tensor.device.type == "cpu" for tensor in tensors)
@@ -134,7 +134,7 @@ def compile_graph(
         options: of Inductor.
 
     Raises:
-        One of :data:`COMPILATION_ERRORS`.
+        Exception: one of :data:`COMPILATION_ERRORS`.
     """
     fake = FakeTensorMode(shape_env=ShapeEnv())  # which Inductor's cache on the disk needs
     examples: Any = [fake.from_tensor(each, static_shapes=True) for each in arguments]

@@ -136,7 +136,7 @@ class Cohort:
         """Fly from the next episode on by compiled programs; see :class:`CompiledSlots`.
 
         Raises:
-            One of :data:`hyuav.recording.COMPILATION_ERRORS`.
+            Exception: one of :data:`hyuav.recording.COMPILATION_ERRORS`.
         """
         if self._compiled is None:
             self._compiled = CompiledSlots(

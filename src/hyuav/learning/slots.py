@@ -36,7 +36,7 @@ class CompiledSlots:
         carrier: what the helpers observe, (N,); an example.
 
     Raises:
-        One of :data:`hyuav.recording.COMPILATION_ERRORS`.
+        Exception: one of :data:`hyuav.recording.COMPILATION_ERRORS`.
     """
 
     def __init__(

@@ -1,0 +1,203 @@
+"""The reference of recipes and configuration, from the typed defaults themselves."""
+
+import ast
+import importlib.util
+import inspect
+import itertools
+import re
+import sys
+import textwrap
+from collections.abc import Iterable, Iterator
+from dataclasses import MISSING, Field, fields
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from hydra.core.config_store import ConfigStore
+from omegaconf import OmegaConf
+
+from hyuav.errors import InputError
+from hyuav.learning.algorithms.registry import ALGORITHMS, BUILT_IN
+from hyuav.learning.cohort import Learner
+from hyuav.parameters import Converter, Parameters
+from hyuav.scenario import PRESETS, Scenario
+
+RECIPES = Path(__file__).parents[2] / "recipes"
+
+_GREEK = "beta|gamma|Delta|epsilon|kappa|sigma|tau"
+
+
+def recipes_page() -> str:
+    """Every recipe: what it is for, how it is called, all that can be set and its default."""
+    parts = [
+        "# Recipes",
+        "Short scripts, meant to be copied and edited. Anything below can be set by `name=value`, "
+        "in a section or group by `section.name=value`; `--help` lists it too, and "
+        "`--config-dir DIR` adds files of your own. The groups `scenario` and `algorithm` are "
+        "chosen by a name and changed field by field: "
+        "[their fields](configuration.md).",
+    ]
+    for path in sorted(RECIPES.glob("*.py")):
+        parts += _recipe(path)
+    return "\n\n".join(parts) + "\n"
+
+
+def configuration_page() -> str:
+    """The scenario, the algorithms and the learners, field by field."""
+    names = ", ".join(f"`{name}`" for name in PRESETS)
+    parts = [
+        "# Configuration",
+        "What every field means is told with its equation in [The model](../model.md).",
+        "## `scenario`",
+        f"[`hyuav.Scenario`][hyuav.scenario.Scenario]. Presets, which give `ue_positions`: "
+        f"{names}.",
+        table(Scenario),
+    ]
+    for name in BUILT_IN:
+        parameters = ALGORITHMS[name]
+        path = f"{parameters.__module__}.{parameters.__qualname__}"
+        parts += [f"## `algorithm={name}`", f"[`{path}`][{path}]", table(parameters)]
+    parts += [
+        "## `learners`",
+        "In a run's `config.yaml`, and in Python: "
+        "[`hyuav.Learner`][hyuav.learning.cohort.Learner].",
+        table(Learner),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def table(parameters: type[Parameters], defaults: dict[str, Any] | None = None) -> str:
+    """A row for every field of a record.
+
+    Args:
+        parameters: the record.
+        defaults: where they differ from the record's own.
+    """
+    documented = descriptions(parameters)
+    rows = [("name", "default", "accepted", "unit", "symbol", "meaning")]
+    for field in fields(parameters):
+        own = field.default if defaults is None else defaults[field.name]
+        cells = (
+            f"`{field.name}`",
+            "required" if own is MISSING else f"`{_shown(own)}`",
+            accepted(field),
+            field.metadata["unit"],
+            _symbol(field.metadata["symbol"]),
+            documented.get(field.name, ""),
+        )
+        rows.append(cells)
+    filled = [column for column in zip(*rows, strict=True) if any(column[1:])]
+    lines = [" | ".join(row).join(("| ", " |")) for row in zip(*filled, strict=True)]
+    return "\n".join([lines[0], "|---" * len(filled) + "|", *lines[1:]])
+
+
+def accepted(field: Field[Any]) -> str:
+    """What a field takes, as its own check words it when it is given something else."""
+    convert: Converter = field.metadata["convert"]
+    one, several = _refusal(convert, object()), _refusal(convert, [])
+    text = one or "anything"
+    if several is None:
+        text += ", or a list of any length"
+    elif several != one:
+        text += ", or a list"
+    return text if _refusal(convert, None) else f"{text}, or null"
+
+
+def descriptions(parameters: type[Parameters]) -> dict[str, str]:
+    """What stands below each field of a record in the source, its base classes included."""
+    found: dict[str, str] = {}
+    for owner in reversed(parameters.__mro__):
+        if issubclass(owner, Parameters):
+            body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
+            assert isinstance(body, ast.ClassDef)
+            found |= dict(_documented(body.body))
+    return found
+
+
+def _documented(body: list[ast.stmt]) -> Iterator[tuple[str, str]]:
+    for field, after in itertools.pairwise(body):
+        is_text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        if is_text and isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+            text = " ".join(inspect.cleandoc(after.value.value).split())  # type: ignore[attr-defined]
+            yield field.target.id, re.sub(r":\w+:`([\w.]+)`", _link, text)
+
+
+def _link(role: re.Match[str]) -> str:
+    path = role[1]
+    return f"[`{path}`][{path}]" if path.startswith("hyuav.") else f"`{path}`"
+
+
+def _refusal(convert: Converter, value: object) -> str | None:
+    """What a check says it expects instead of a value; None where it takes the value."""
+    try:
+        convert("", value)
+    except InputError as error:
+        return str(error).partition(": expected ")[2].partition(" (did you mean")[0]
+    return None
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_shown, value))}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _symbol(name: str) -> str:
+    if not name:
+        return ""
+    latex = re.sub(rf"\b({_GREEK})(?=\b|_)", r"\\\1", name)
+    latex = re.sub(r"([_^])(\w\w+)", r"\1{\\mathrm{\2}}", latex)
+    return f"${latex}$"
+
+
+def _recipe(path: Path) -> list[str]:
+    module = _load(path)
+    purpose, _, calls = (module.__doc__ or "").partition("\n\n")
+    stored = OmegaConf.to_container(ConfigStore.instance().load(f"{path.stem}.yaml").node)
+    assert isinstance(stored, dict)
+    node: dict[str, Any] = {str(name): value for name, value in stored.items()}
+    members = [entry for entry in node.pop("defaults") if isinstance(entry, dict)]
+    groups = {
+        group: member
+        for entry in members
+        for group, member in entry.items()
+        if not str(group).startswith("override")
+    }
+    directory = node.pop("hydra")["run"]["dir"]
+    sections = {name: value for name, value in node.items() if isinstance(value, dict)}
+    options = {name: value for name, value in node.items() if name not in sections}
+    more, _, calls = f"\n\n{calls}".rpartition("\n\n")
+    parts = [f"## `{path.name}`", *filter(None, [purpose, more.strip()])]
+    parts += [f"```sh\n{calls.strip()}\n```", table(_record(module, options), options)]
+    if groups:
+        chosen = ", ".join(f"`{group}={member}`" for group, member in groups.items())
+        parts.append(f"Groups: {chosen}. [Their fields](configuration.md).")
+    for name, values in sections.items():
+        parts += [f"`{name}`:", table(_record(module, values), values)]
+    if directory != "." and "${output}" not in directory:
+        parts.append(f"Writes to `{directory}`.")
+    return parts
+
+
+def _load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"recipe_{path.stem}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where the source of its classes is looked for
+    spec.loader.exec_module(module)
+    return module
+
+
+def _record(module: ModuleType, names: Iterable[str]) -> type[Parameters]:
+    """The record with just these fields that a recipe has imported or defined."""
+    for value in vars(module).values():
+        if isinstance(value, type) and issubclass(value, Parameters):
+            own = {field.name for field in fields(value)}
+            if own == set(names):
+                return value
+    raise LookupError(f"{module.__name__}: no record has the fields {sorted(names)}")

@@ -1,0 +1,79 @@
+"""The algorithms by name, and how a user's own join them."""
+
+import importlib.util
+import os
+import re
+import sys
+from pathlib import Path
+
+from hyuav.errors import InputError, InputTypeError, rejection
+from hyuav.learning.algorithms.base import AlgorithmParameters
+from hyuav.learning.algorithms.ddpg import DDPG
+from hyuav.learning.algorithms.robust import RobustDDPG, RobustTD3
+from hyuav.learning.algorithms.sac import SAC
+from hyuav.learning.algorithms.td3 import TD3
+
+OWN_FILES = "HYUAV_ALGORITHMS"
+"""Environment variable that names Python files with a user's own algorithms."""
+
+ALGORITHMS: dict[str, type[AlgorithmParameters]] = {
+    "ddpg": DDPG,
+    "td3": TD3,
+    "sac": SAC,
+    "ddpg_robust": RobustDDPG,
+    "td3_robust": RobustTD3,
+}
+"""Those of this library, and after them those that :func:`register` has added."""
+
+BUILT_IN = tuple(ALGORITHMS)
+
+
+def register(name: str, algorithm: type[AlgorithmParameters]) -> None:
+    """Let a name choose an algorithm, on the command line and in a run's configuration.
+
+    The recipes find it in a file that the environment variable ``HYUAV_ALGORITHMS`` names. No
+    file of a run names code to be executed.
+
+    Args:
+        name: of lower-case letters, digits and underscores. It replaces an earlier one of the
+            user's own.
+        algorithm: a frozen dataclass of parameters, each with a default.
+
+    Raises:
+        InputError: the name cannot be used.
+        InputTypeError: the class cannot be created without arguments, or is of another kind.
+
+    Example:
+        >>> register("ddpg_relu", ReluDDPG)
+    """
+    taken = name in BUILT_IN or name.endswith("_robust")  # which stands for variants of a plain one
+    if taken or not re.fullmatch(r"[a-z][a-z0-9_]*", name):
+        accepted = "lower-case letters, digits and underscores, and a name that is not taken"
+        raise InputError(rejection("algorithm", name, accepted))
+    try:
+        acceptable = isinstance(algorithm(), AlgorithmParameters)
+    except TypeError:
+        acceptable = False
+    if not acceptable:
+        accepted = "a subclass of AlgorithmParameters with build() and a default for each field"
+        raise InputTypeError(rejection(name, algorithm, accepted))
+    ALGORITHMS[name] = algorithm
+
+
+def run_own_files(paths: str) -> None:
+    """Run the Python files that register a user's own algorithms.
+
+    Args:
+        paths: of the files, joined as in PATH.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    for path in filter(None, paths.split(os.pathsep)):
+        file = Path(path)
+        spec = importlib.util.spec_from_file_location(f"hyuav_own_{file.stem}", file)
+        if spec is None or spec.loader is None or not file.is_file():
+            raise InputError(rejection(OWN_FILES, path, "a Python file"))
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[spec.name] = module  # where dataclasses and pickle look for it
+        spec.loader.exec_module(module)

@@ -1,0 +1,77 @@
+"""The generated reference tells all that there is, as it is."""
+
+import dataclasses
+import re
+from pathlib import Path
+
+from api import ROOMS, modules, pages
+from configuration import accepted, configuration_page, descriptions, recipes_page, table
+from hyuav import Learner, Scenario
+from hyuav.learning.algorithms import ALGORITHMS, DDPG, RobustDDPG
+from hyuav.learning.training import TrainingParameters
+
+ROOT = Path(__file__).parents[2]
+
+
+def sections(page: str) -> dict[str, str]:
+    titled = re.split(r"^## `(.+)`$", page, flags=re.MULTILINE)[1:]
+    return dict(zip(titled[::2], titled[1::2], strict=True))
+
+
+def rows(text: str) -> list[list[str]]:
+    lines = [line for line in text.splitlines() if line.startswith("| `")]
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+
+
+def test_every_field_of_scenario_algorithms_and_learners_has_a_row() -> None:
+    parts = sections(configuration_page())
+    named = {"scenario": Scenario, "learners": Learner}
+    named |= {f"algorithm={name}": parameters for name, parameters in ALGORITHMS.items()}
+    assert set(parts) == set(named)
+    for title, record in named.items():
+        listed = [row[0] for row in rows(parts[title])]
+        assert listed == [f"`{field.name}`" for field in dataclasses.fields(record)]
+
+
+def test_every_recipe_has_a_section_with_its_options() -> None:
+    parts = sections(recipes_page())
+    assert set(parts) == {path.name for path in (ROOT / "recipes").glob("*.py")}
+    train = [row[0] for row in rows(parts["train.py"])]
+    assert {"`learners`", "`warm_start`", "`num_episodes`", "`mode`"} <= set(train)
+    assert all("python recipes/" in text for text in parts.values())
+
+
+def test_a_recipe_that_changes_a_default_shows_its_own() -> None:
+    of_compare = {row[0]: row[1] for row in rows(sections(recipes_page())["compare.py"])}
+    of_train = {row[0]: row[1] for row in rows(sections(recipes_page())["train.py"])}
+    assert (of_train["`num_episodes`"], of_compare["`num_episodes`"]) == ("`1000`", "`600`")
+    assert (of_train["`mode`"], of_compare["`mode`"]) == ("`offline`", "`disabled`")
+
+
+def test_a_row_gives_default_check_unit_symbol_and_meaning() -> None:
+    by_name = {row[0]: row for row in rows(table(Scenario))}
+    shown = ["`max_speed`", "`20`", "a finite number > 0", "m/s", r"$v_{\mathrm{max}}$"]
+    assert by_name["`max_speed`"] == shown
+    assert by_name["`ue_positions`"][1] == "required"
+    clock = {row[0]: row for row in rows(table(DDPG))}["`clock`"]
+    assert clock[1:3] == ["`false`", "true or false"]
+    assert clock[-1] == "Observe the slots flown."
+
+
+def test_what_is_accepted_is_what_the_check_says() -> None:
+    fields = {field.name: field for field in dataclasses.fields(Learner)}
+    assert accepted(fields["scheme"]) == "one of hybrid, relay, jamming"
+    assert accepted(fields["num_slots"]) == "a whole number >= 1, or null"
+    sizes = {field.name: field for field in dataclasses.fields(DDPG)}["hidden_sizes"]
+    assert accepted(sizes) == "the sizes of at least one hidden layer"
+
+
+def test_what_the_source_says_of_a_field_is_found_in_base_classes_too() -> None:
+    assert descriptions(TrainingParameters)["cohorts"].startswith("Groups of learners")
+    assert descriptions(RobustDDPG)["finite_horizon"].startswith("The last slot ends the return")
+
+
+def test_every_public_module_is_on_one_page_of_the_api_reference() -> None:
+    shown = re.findall(r"^::: (\S+)$", "\n".join(pages().values()), flags=re.MULTILINE)
+    assert sorted(shown) == sorted(modules())
+    assert set(pages()) == {"index.md", *(f"{room}.md" for room in ROOMS)}

@@ -1,0 +1,99 @@
+"""A user's own algorithms beside those of the library."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hyuav import InputError, InputTypeError, register
+from hyuav.learning.algorithms import ALGORITHMS, DDPG, AlgorithmParameters
+from hyuav.learning.algorithms.registry import run_own_files
+from hyuav.parameters import number, parameter
+from hyuav.runs import named_algorithm
+
+OWN = """
+from dataclasses import dataclass
+from hyuav import DDPG, register
+from hyuav.parameters import number, parameter
+
+@dataclass(frozen=True)
+class Own(DDPG):
+    boldness: float = parameter(number(0.0), 2.0)
+
+register("own", Own)
+"""
+
+
+@dataclass(frozen=True)
+class Bold(DDPG):
+    boldness: float = parameter(number(0.0), 2.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demanding(DDPG):
+    boldness: float = parameter(number(0.0))
+
+
+@pytest.fixture(autouse=True)
+def as_before() -> Iterator[None]:
+    before = dict(ALGORITHMS)
+    yield
+    ALGORITHMS.clear()
+    ALGORITHMS.update(before)
+
+
+def test_a_registered_name_reads_the_configuration_of_its_runs() -> None:
+    register("bold", Bold)
+    assert named_algorithm({"name": "bold", "boldness": 3.0}) == ("bold", Bold(boldness=3.0))
+
+
+def test_registering_again_replaces_ones_own() -> None:
+    register("bold", DDPG)
+    register("bold", Bold)
+    assert ALGORITHMS["bold"] is Bold
+
+
+@pytest.mark.parametrize("name", ["ddpg", "Bold", "bold-er", "", "../bold", "bold_robust", "b\n"])
+def test_names_that_are_taken_or_are_no_names_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match=r"algorithm = .*: expected .*not taken"):
+        register(name, Bold)
+    assert ALGORITHMS["ddpg"] is DDPG
+
+
+@pytest.mark.parametrize("algorithm", [AlgorithmParameters, Demanding, dict, None])
+def test_what_cannot_be_created_without_arguments_is_refused(algorithm: Any) -> None:
+    with pytest.raises(InputTypeError, match="subclass of AlgorithmParameters"):
+        register("bold", algorithm)
+    assert "bold" not in ALGORITHMS
+
+
+def test_files_register_their_algorithms(tmp_path: Path) -> None:
+    file = tmp_path / "own.py"
+    file.write_text(OWN)
+    run_own_files(f"{file}{os.pathsep}")
+    assert named_algorithm({"name": "own"})[1].to_dict()["boldness"] == 2.0
+
+
+@pytest.mark.parametrize("name", ["missing.py", "directory.py", "text.txt"])
+def test_what_is_no_python_file_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / "directory.py").mkdir()
+    (tmp_path / "text.txt").write_text(OWN)
+    with pytest.raises(InputError, match=r"HYUAV_ALGORITHMS = .*: expected a Python file"):
+        run_own_files(str(tmp_path / name))
+
+
+def test_the_environment_variable_is_read_on_import(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    shown = subprocess.run(
+        [sys.executable, "-c", "import hyuav.runs as r; print(r.ALGORITHMS['own']().boldness)"],
+        env={**os.environ, "HYUAV_ALGORITHMS": str(tmp_path / "own.py")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert shown.stdout.strip() == "2.0"

@@ -1,0 +1,137 @@
+"""The distributions are complete, and the wheel works without the repository."""
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXAMPLE = ROOT / "examples" / "first_training.py"
+
+
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with the sdist, and the wheel that was built from it."""
+    source = tmp_path_factory.mktemp("source")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    leave = shutil.ignore_patterns("__pycache__", "*.egg-info")
+    for name in ("src", "tests", "recipes"):
+        shutil.copytree(ROOT / name, source / name, ignore=leave)
+    command = [
+        sys.executable,
+        "-m",
+        "build",
+        "--no-isolation",
+        "--outdir",
+        f"{source}/dist",
+        f"{source}",
+    ]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    return source / "dist"
+
+
+@pytest.fixture(scope="module")
+def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with nothing but the installed wheel."""
+    target = tmp_path_factory.mktemp("installed")
+    (wheel,) = dist.glob("*.whl")
+    options = ["--quiet", "--no-index", "--no-deps", "--no-compile", "--target", str(target)]
+    subprocess.run([sys.executable, "-m", "pip", "install", *options, str(wheel)], check=True)
+    return target
+
+
+def run(installed: Path, directory: Path, *arguments: str) -> str:
+    """What Python prints, with the installed wheel in place of the repository."""
+    environment = {**os.environ, "PYTHONPATH": str(installed), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=directory,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_wheel_holds_the_library_and_nothing_else(dist: Path) -> None:
+    (wheel,) = dist.glob("*.whl")
+    names = zipfile.ZipFile(wheel).namelist()
+    own = {str(path.relative_to(ROOT / "src")) for path in (ROOT / "src").rglob("*.py")}
+    assert own <= set(names)
+    data = {"hyuav/py.typed"}
+    data |= {
+        str(path.relative_to(ROOT / "src"))
+        for path in (ROOT / "src/hyuav/report/templates").iterdir()
+    }
+    assert len(data) > 1
+    assert data <= set(names)
+    beside = {name for name in names if not name.startswith("hyuav-")}
+    assert beside == own | data
+
+
+def test_the_sdist_holds_what_the_wheel_is_built_from(dist: Path) -> None:
+    (sdist,) = dist.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    expected = {"pyproject.toml", "README.md", "LICENSE", "src/hyuav/py.typed"}
+    assert expected <= names
+
+
+def test_the_wheel_makes_environments_and_presets(installed: Path, tmp_path: Path) -> None:
+    program = (
+        "import gymnasium, hyuav\n"
+        "env = gymnasium.make('hyuav/SecureOffloading-v0', scenario='random_disk')\n"
+        "observation, _ = env.reset(seed=0)\n"
+        "print(hyuav.__file__, observation.shape, hyuav.Scenario.preset('two_clusters').num_ues)\n"
+        "import hyuav.report.page\n"
+    )
+    shown = run(installed, tmp_path, "-c", program)
+    assert shown.split(maxsplit=1) == [str(installed / "hyuav/__init__.py"), "(15,) 10\n"]
+
+
+def test_the_five_line_example_trains_with_the_wheel(installed: Path, tmp_path: Path) -> None:
+    shutil.copy(EXAMPLE, tmp_path)
+    lines = run(installed, tmp_path, EXAMPLE.name).splitlines()
+    told = [line for line in lines if re.fullmatch(r"episode \d+: -?\d+\.\d\d bps/Hz", line)]
+    assert len(told) == 20
+
+
+def test_the_example_has_five_lines() -> None:
+    purpose, *statements = ast.walk(ast.parse(EXAMPLE.read_text()))
+    del purpose
+    lines = {node.lineno for node in statements if isinstance(node, ast.stmt)}
+    assert len(lines) - 1 == 5  # the first is the docstring
+
+
+def test_changelog_and_citation_are_of_this_version() -> None:
+    version = PROJECT["version"]
+    changelog = (ROOT / "CHANGELOG.md").read_text()
+    latest = re.search(r"^## (\S+) - (unreleased|\d{4}-\d\d-\d\d)$", changelog, flags=re.MULTILINE)
+    assert latest is not None
+    assert latest[1] == version
+    assert f"version: {version}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def test_this_python_is_one_of_those_stated() -> None:
+    lowest = tuple(map(int, PROJECT["requires-python"].removeprefix(">=").split(".")))
+    assert sys.version_info >= lowest
+    named = "Programming Language :: Python :: {}.{}".format(*lowest)
+    assert named in PROJECT["classifiers"]
+
+
+def test_the_extras_are_there() -> None:
+    assert {"bench", "dashboard", "docs", "dev"} <= set(PROJECT["optional-dependencies"])
