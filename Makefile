@@ -35,13 +35,13 @@ dashboard: setup ## follow trainings, compare runs, play flights, try scenarios 
 test: setup ## run the tests
 	$(BIN)/python -m pytest --numprocesses 2 $(ARGS)
 
-test-slow: setup ## run the learning checks that take minutes
+test-slow: setup ## run the checks that take minutes: learning, pages, distributions
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
 lint: setup ## check style, formatting, types, docstrings and dependencies
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/interrogate --quiet src
+	$(BIN)/interrogate src
 	$(BIN)/deptry .
 	$(BIN)/mypy
 
@@ -54,7 +54,7 @@ docs: setup ## build the documentation into build/site, strictly and without a n
 
 dist: setup ## build wheel and sdist, and try the wheel in an empty environment
 	rm -rf dist build/empty
-	$(BIN)/python -m build
+	$(BIN)/python -m build --no-isolation
 	$(PYTHON) -m venv build/empty
 	build/empty/bin/python -m pip install --quiet --constraint constraints.txt dist/*.whl
 	cd build && empty/bin/python -I ../examples/first_training.py

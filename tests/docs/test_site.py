@@ -10,6 +10,8 @@ import pytest
 
 from mathematics import link_readings, render
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 _FETCHED = re.compile(
     r"""<(?:script|img|iframe|source)\b[^>]*\bsrc=["']?https?:|<link\b[^>]*\bhref=["']?https?:"""
@@ -60,6 +62,14 @@ def test_docstrings_link_to_what_they_name(site: Path) -> None:
     page = (site / "reference" / "api" / "learning.html").read_text(encoding="utf-8")
     assert ":class:`" not in page
     assert 'href="#hyuav.learning.exploration.WarmUp"' in page
+
+
+def test_parameters_show_their_defaults(site: Path) -> None:
+    page = (site / "reference" / "api" / "scenario.html").read_text(encoding="utf-8")
+    signature = page[page.index('id="hyuav.scenario.Scenario"') :].partition("</code></pre>")[0]
+    text = re.sub(r"<[^>]+>", "", signature)
+    assert "num_slots: int = 20" in text
+    assert "parameter(" not in text
 
 
 def test_an_equation_stands_in_parts_that_a_narrow_page_may_break() -> None:

@@ -14,8 +14,13 @@ from typing import NamedTuple
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted((ROOT / "docs" / "tutorials").glob("*.md")), ROOT / "docs" / "index.md"]
+
+OPTIONAL = {"stable_baselines3": "stable_baselines3"}
+"""What a page needs beyond the library."""
 
 _FENCE = re.compile(r'^```(python|sh)(?: title="([\w.]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 
@@ -51,6 +56,8 @@ def session(page: Path, directory: Path) -> str:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_what_a_page_tells_to_run_runs(page: Path, tmp_path: Path) -> None:
+    if page.stem in OPTIONAL:
+        pytest.importorskip(OPTIONAL[page.stem])
     (tmp_path / "recipes").symlink_to(ROOT / "recipes")
     program = session(page, tmp_path)
     environment = {

@@ -43,7 +43,8 @@ class TrainingParameters(Parameters):
     evaluation_seed: int = parameter(count(0), 20_000)
     compile: str = parameter(choice("auto", "always", "never"), "auto")
     cohorts: int = parameter(count(), cores())
-    """Groups of learners that are trained at the same time, each on a thread of its own."""
+    """Groups of learners that are trained at the same time, each on a thread of its own; by default
+    one for each core."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

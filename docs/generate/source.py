@@ -1,4 +1,4 @@
-"""Cross-references of docstrings, such as ``:func:`name```, as links of the API reference."""
+"""What the API reference is told of the source: links for roles, plain defaults of parameters."""
 
 import re
 from collections.abc import Iterator
@@ -17,6 +17,17 @@ class Roles(griffe.Extension):
         for owner in _objects(pkg):
             if owner.docstring is not None:
                 owner.docstring.value = rewritten(owner.docstring.value, owner, loader)
+
+
+class Defaults(griffe.Extension):
+    """Show ``parameter(check, default)`` as the default that it declares."""
+
+    def on_attribute_instance(self, *, attr: griffe.Attribute, **_: Any) -> None:
+        """Put the default in the place of the declaration."""
+        declared = attr.value
+        if isinstance(declared, griffe.ExprCall) and str(declared.function) == "parameter":
+            given = [each for each in declared.arguments if not hasattr(each, "name")]
+            attr.value = given[1] if len(given) > 1 else None
 
 
 def rewritten(text: str, owner: griffe.Object, loader: griffe.GriffeLoader) -> str:
