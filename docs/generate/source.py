@@ -26,8 +26,9 @@ class Defaults(griffe.Extension):
         """Put the default in the place of the declaration."""
         declared = attr.value
         if isinstance(declared, griffe.ExprCall) and str(declared.function) == "parameter":
-            given = [each for each in declared.arguments if not hasattr(each, "name")]
-            attr.value = given[1] if len(given) > 1 else None
+            _, *default = declared.arguments
+            by_name = not default or isinstance(default[0], griffe.ExprKeyword)
+            attr.value = None if by_name else default[0]
 
 
 def rewritten(text: str, owner: griffe.Object, loader: griffe.GriffeLoader) -> str:

@@ -80,8 +80,8 @@ class Compare(Parameters):
     threshold: float = parameter(number(0.0, 1.0), 0.97)
     """Share of the optimum that counts as solved."""
     workers: int = parameter(count(), cores())
-    """Processes that train at the same time; with one, it is this process. The default is the number
-    of cores."""
+    """Processes that train at the same time; with one, it is this process. By default as many
+    as cores."""
     output: str = parameter(text, "runs/${now:%Y-%m-%d_%H-%M-%S}_compare")
     """Directory of the comparison, which may have been begun."""
 
