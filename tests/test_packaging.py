@@ -16,6 +16,14 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+BESIDE_THE_CODE = (
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "LICENSE",
+    "MANIFEST.in",
+    "README.md",
+    "pyproject.toml",
+)
 EXAMPLE = ROOT / "examples" / "first_training.py"
 
 
@@ -23,21 +31,13 @@ EXAMPLE = ROOT / "examples" / "first_training.py"
 def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A directory with the sdist, and the wheel that was built from it."""
     source = tmp_path_factory.mktemp("source")
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in BESIDE_THE_CODE:
         shutil.copy(ROOT / name, source)
     leave = shutil.ignore_patterns("__pycache__", "*.egg-info")
     for name in ("src", "tests", "recipes"):
         shutil.copytree(ROOT / name, source / name, ignore=leave)
-    command = [
-        sys.executable,
-        "-m",
-        "build",
-        "--no-isolation",
-        "--outdir",
-        f"{source}/dist",
-        f"{source}",
-    ]
-    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "build", "--no-isolation", f"--outdir={source}/dist"]
+    built = subprocess.run([*command, source], capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
     return source / "dist"
 
@@ -67,6 +67,7 @@ def run(installed: Path, directory: Path, *arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_the_library_and_nothing_else(dist: Path) -> None:
     (wheel,) = dist.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
@@ -83,14 +84,16 @@ def test_the_wheel_holds_the_library_and_nothing_else(dist: Path) -> None:
     assert beside == own | data
 
 
+@pytest.mark.slow
 def test_the_sdist_holds_what_the_wheel_is_built_from(dist: Path) -> None:
     (sdist,) = dist.glob("*.tar.gz")
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
-    expected = {"pyproject.toml", "README.md", "LICENSE", "src/hyuav/py.typed"}
-    assert expected <= names
+    assert {*BESIDE_THE_CODE, "src/hyuav/py.typed"} <= names
+    assert not any(name.startswith("tests") for name in names)
 
 
+@pytest.mark.slow
 def test_the_wheel_makes_environments_and_presets(installed: Path, tmp_path: Path) -> None:
     program = (
         "import gymnasium, hyuav\n"
@@ -103,6 +106,7 @@ def test_the_wheel_makes_environments_and_presets(installed: Path, tmp_path: Pat
     assert shown.split(maxsplit=1) == [str(installed / "hyuav/__init__.py"), "(15,) 10\n"]
 
 
+@pytest.mark.slow
 def test_the_five_line_example_trains_with_the_wheel(installed: Path, tmp_path: Path) -> None:
     shutil.copy(EXAMPLE, tmp_path)
     lines = run(installed, tmp_path, EXAMPLE.name).splitlines()
