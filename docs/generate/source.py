@@ -26,7 +26,7 @@ class Defaults(griffe.Extension):
         """Put the default in the place of the declaration."""
         declared = attr.value
         if isinstance(declared, griffe.ExprCall) and str(declared.function) == "parameter":
-            _, *default = declared.arguments
+            default = list(declared.arguments)[1:]
             by_name = not default or isinstance(default[0], griffe.ExprKeyword)
             attr.value = None if by_name else default[0]
 
