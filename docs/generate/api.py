@@ -27,7 +27,13 @@ SHARED = {
     "scenario": ("hyuav.scenario", "hyuav.layouts", "hyuav.parameters", "hyuav.errors"),
     "envs": ("hyuav.system", "hyuav.randomness", "hyuav.recording"),
     "evaluation": ("hyuav.evaluation", "hyuav.intervals", "hyuav.maps"),
-    "recipes": ("hyuav.experiment", "hyuav.runs", "hyuav.configuration", "hyuav.terminal"),
+    "recipes": (
+        "hyuav.experiment",
+        "hyuav.runs",
+        "hyuav.metrics",
+        "hyuav.configuration",
+        "hyuav.terminal",
+    ),
 }
 """Modules that stand beside the packages, by the page that shows them."""
 
