@@ -3,7 +3,14 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import ReplayBuffer
 
-from hyuav.learning.replay import RETURN, TRANSITION, Memory, make_replay, sampled_slots
+from hyuav.learning.replay import (
+    RETURN,
+    TRANSITION,
+    Memory,
+    favouring_recent,
+    make_replay,
+    sampled_slots,
+)
 
 
 def transition(learners: int, slot: int) -> TensorDictBase:
@@ -32,6 +39,25 @@ def test_every_stored_slot_is_drawn_as_often_and_no_other(length: int) -> None:
     edges = torch.tensor([0.0, 1.0 - 2**-24, 1.0])
     assert sampled_slots(edges, length).tolist() == [0, length - 1, length - 1]
     assert torch.equal(sampled_slots(grid, torch.tensor([length])), drawn)
+
+
+def test_recent_slots_are_drawn_more_often_and_all_sometimes() -> None:
+    grid = (torch.arange(80_000) + 0.5) / 80_000
+    drawn = sampled_slots(favouring_recent(grid, 3.0), 8).bincount(minlength=8) / 80_000
+    ages = torch.arange(8, -1, -1) / 8  # of a slot's edges, as shares of the oldest's
+    expected = ages[:-1] ** (1 / 3) - ages[1:] ** (1 / 3)
+    torch.testing.assert_close(drawn, expected, atol=1e-3, rtol=0.0)
+    assert drawn.argmax() == 7
+
+
+@pytest.mark.parametrize("stored", [3, 7, 11])  # of 5 that are kept
+def test_by_age_the_greatest_numbers_draw_the_newest_slots(stored: int) -> None:
+    uniforms = iter([torch.tensor([[0.0, 0.999]])])
+    replay = make_replay(5, 2, uniforms, torch.device("cpu"), by_age=True)
+    for slot in range(stored):
+        replay.extend(Memory().transition(transition(1, slot)).unsqueeze(0))
+    oldest, newest = replay.sample()["next", "reward"].flatten().tolist()
+    assert (oldest, newest) == (max(0, stored - 5), stored - 1)
 
 
 def test_each_learner_samples_only_its_own_transitions() -> None:

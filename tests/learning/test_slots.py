@@ -32,7 +32,9 @@ CASES = [
 
 def cohort(name: str, scenario: Scenario = SCENARIO, batch_size: int = 8) -> Cohort:
     short: dict[str, Any] = (
-        {"warm_up_episodes": 3, "repeat_every": 2} if name.endswith("robust") else {}
+        {"warm_up_episodes": 3, "repeat_every": 2, "restart_after": 5}
+        if name.endswith("robust")
+        else {}
     )
     return Cohort(
         scenario,

@@ -13,7 +13,7 @@ from torchrl.collectors import Collector
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.repetition import BestFlights, as_planned
-from hyuav.learning.replay import make_replay
+from hyuav.learning.replay import favouring_recent, make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import (
     copy_weights,
@@ -84,7 +84,11 @@ class Cohort:
         draw_weights(self.algorithm.loss, seeds)
         self._streams = self._random_streams(seeds)
         self.replay = make_replay(
-            replay_size, batch_size, self._streams["sampling"], self.env.device
+            replay_size,
+            batch_size,
+            map(self._favour, self._streams["sampling"]),
+            self.env.device,
+            by_age=algorithm.recency > 1.0,
         )
         self.best_flights = BestFlights(len(seeds), scenario.num_slots, self.env.device)
         self.episode = self.updates = 0
@@ -126,6 +130,11 @@ class Cohort:
         """Actions (T, N, 2) that are taken whatever the explorer says, NaN where there are none."""
         planned = self.best_flights.actions
         return planned if self.algorithm.repeats(self.episode) else planned * torch.nan
+
+    def _favour(self, uniform: Tensor) -> Tensor:
+        """Numbers by which transitions are drawn, in this episode's favour of recent ones."""
+        recency = self.algorithm.recency(self.episode)
+        return uniform if recency == 1.0 else favouring_recent(uniform, recency)
 
     @property
     def learns(self) -> bool:
@@ -169,6 +178,7 @@ class Cohort:
     def _fly_compiled(self, compiled: CompiledSlots) -> tuple[Tensor, dict[str, Tensor]]:
         slots, draws = self.scenario.num_slots, self.env.base_env.draws
         blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
+        blocks["sampling"] = self._favour(blocks["sampling"])
         if self.algorithm.parameters.repeat_every:
             blocks["plan"] = self._plan()
         if self.scenario.fading:

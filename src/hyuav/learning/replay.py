@@ -8,7 +8,7 @@ import torch
 from tensordict import NestedKey, TensorDictBase
 from torch import Tensor
 from torchrl.data import LazyTensorStorage, ReplayBuffer
-from torchrl.data.replay_buffers import RandomSampler, Storage
+from torchrl.data.replay_buffers import RandomSampler, RoundRobinWriter, Storage
 
 TRANSITION: tuple[NestedKey, ...] = (
     "observation",
@@ -28,28 +28,52 @@ def sampled_slots(uniform: Tensor, length: int | Tensor) -> Tensor:
     return (uniform * length).long().clamp(max=length - 1)  # rounding may reach the length
 
 
+def favouring_recent(uniform: Tensor, recency: float) -> Tensor:
+    """Bring numbers in [0, 1) nearer to 1: the age that they stand for, 1 - u, to this power."""
+    return 1.0 - (1.0 - uniform) ** recency
+
+
+def from_the_oldest(drawn: Tensor, cursor: int | Tensor, length: int | Tensor) -> Tensor:
+    """Where in a round-robin storage the slots are that were drawn in order of age, 0 the oldest.
+
+    Args:
+        drawn: (N, K) int64.
+        cursor: where the next slot will be stored.
+        length: slots stored.
+    """
+    return (drawn + cursor) % length
+
+
 class LearnerSampler(RandomSampler):
-    """Draw K slots for each learner, uniformly and with replacement, each learner its own.
+    """Draw K slots for each learner, with replacement, each learner its own.
 
     Args:
         uniforms: gives numbers in [0, 1) for each mini-batch, (N, K).
+        writer: of the storage, where a number stands for an age, 1 for the newest.
     """
 
-    def __init__(self, uniforms: Iterator[Tensor]) -> None:
+    def __init__(self, uniforms: Iterator[Tensor], writer: RoundRobinWriter | None = None) -> None:
         super().__init__()
-        self._uniforms = uniforms
+        self._uniforms, self._writer = uniforms, writer
 
     def sample(
         self, storage: Storage, batch_size: int
     ) -> tuple[tuple[Tensor, Tensor], dict[str, Any]]:
         """The (slots, learners) index, each (N, K), into a storage of (capacity, N)."""
         slots = sampled_slots(next(self._uniforms)[:, :batch_size], len(storage))
+        if self._writer is not None:
+            slots = from_the_oldest(slots, self._writer._cursor, len(storage))
         learners = torch.arange(len(slots), device=slots.device).unsqueeze(-1)
         return (slots, learners.expand(slots.shape)), {}
 
 
 def make_replay(
-    capacity: int, batch_size: int, uniforms: Iterator[Tensor], device: torch.device
+    capacity: int,
+    batch_size: int,
+    uniforms: Iterator[Tensor],
+    device: torch.device,
+    *,
+    by_age: bool = False,
 ) -> ReplayBuffer:
     """The buffer B of Algorithm 1 for N learners.
 
@@ -61,10 +85,14 @@ def make_replay(
         batch_size: K.
         uniforms: gives numbers in [0, 1) for each mini-batch, (N, K).
         device: of the storage.
+        by_age: let greater numbers draw newer transitions; otherwise their order is that of the
+            storage.
     """
+    writer = RoundRobinWriter()
     return ReplayBuffer(
         storage=LazyTensorStorage(capacity, device=device),
-        sampler=LearnerSampler(uniforms),
+        sampler=LearnerSampler(uniforms, writer if by_age else None),
+        writer=writer,
         batch_size=batch_size,
     )
 

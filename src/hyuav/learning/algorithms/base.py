@@ -51,6 +51,10 @@ class AlgorithmParameters(Parameters, ABC):
     restart_after: int = parameter(count(0), 0)
     """Episodes from which on an actor that is evaluated and found worse than it was goes on from
     its best weights; 0 for never."""
+    recency: float = parameter(number(1.0), 1.0)
+    """Once actors restart, the power to which the ages of the transitions drawn are raised, as
+    shares of the oldest's: 1 draws all alike, more prefers recent ones, which lie along the
+    flights that are being refined."""
     return_bound: float = parameter(number(0.0, 1.0), 0.0)
     """Trust in returns above the target; see :class:`hyuav.learning.targets.RaisedTD0`."""
     return_bound_decay: float = parameter(number(0.0, 1.0), 1.0)
@@ -156,6 +160,10 @@ class Algorithm:
     def restarts(self, episode: int) -> bool:
         """Whether actors go back to their best weights after this episode's evaluation."""
         return 0 < self.parameters.restart_after <= episode
+
+    def recency(self, episode: int) -> float:
+        """Power of the ages of the transitions drawn in an episode."""
+        return self.parameters.recency if self.restarts(episode) else 1.0
 
     def repeats(self, episode: int) -> bool:
         """Whether an episode, from 1, is the best flight so far once more."""
