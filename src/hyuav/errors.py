@@ -12,6 +12,26 @@ class InputTypeError(InputError, TypeError):
     """A value of a type that is not accepted."""
 
 
+class Interrupted(KeyboardInterrupt):
+    """A signal asked to stop; the message says in one line how far it came.
+
+    Args:
+        message: the line.
+        signal: its number.
+    """
+
+    def __init__(self, message: str, signal: int) -> None:
+        super().__init__(message, signal)
+        self.signal = signal
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class Halted(Exception):  # noqa: N818 - nothing was wrong with what was asked for
+    """A training cannot go on, for want of space or of numbers; the message is one line."""
+
+
 def rejection(name: str, value: object, accepted: str) -> str:
     """The one line that answers bad input: field, value (shortened), what is accepted."""
     shown = " ".join(repr(value).split())

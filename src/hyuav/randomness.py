@@ -94,20 +94,21 @@ class RowStream:
 
     def __next__(self) -> Tensor:
         """The next draw: (rows, *shape)."""
-        if self._block is None or not 0 <= self._drawn - self._block[0] < BLOCK:
-            self._block = self._drawn, self._numbers(BLOCK)
-        first, numbers = self._block
+        block, place = divmod(self._drawn, BLOCK)
+        if self._block is None or self._block[0] != block:
+            # Wherever drawing begins: a number's rounding may depend on its place in the block.
+            self._block = block, self._numbers(block * BLOCK, BLOCK)
         self._drawn += 1
-        return numbers[self._drawn - 1 - first]
+        return self._block[1][place]
 
     def take(self, count: int) -> Tensor:
         """The next ``count`` draws: (count, rows, *shape)."""
-        numbers = self._numbers(count)
+        numbers = self._numbers(self._drawn, count)
         self._drawn += count
         return numbers
 
-    def _numbers(self, count: int) -> Tensor:
-        draws = torch.arange(self._drawn, self._drawn + count, device=self._keys.device)
+    def _numbers(self, first: int, count: int) -> Tensor:
+        draws = torch.arange(first, first + count, device=self._keys.device)
         draws = draws.reshape(-1, *(1,) * self._keys.ndim) * self._width * GAMMA
         return self._law(splitmix64(draws + self._keys + self._places))
 

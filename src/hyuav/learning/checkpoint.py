@@ -1,44 +1,52 @@
 """Checkpoint files: written whole or not at all, read without running code from them."""
 
+import io
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor
 
+from hyuav.durable import write_durably
 from hyuav.errors import InputError, rejection
 
 FORMAT = "hyuav-checkpoint-1"
 
 
-def save_checkpoint(path: Path, kind: str, content: dict[str, Any]) -> None:
+def save_checkpoint(
+    path: Path, kind: str, content: dict[str, Any], keep: Path | None = None
+) -> None:
     """Write tensors and plain values; an interrupted write leaves an older file as it was.
 
     Args:
         path: of the file.
         kind: what it holds, "training" or "weights"; a reader asks for it by this word.
         content: tensors and plain values, nested in dicts, lists and tuples.
+        keep: where an older file is kept; it is lost where this is None.
+
+    Raises:
+        OSError: it cannot be written, for want of space perhaps.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.partial")
-    torch.save({"format": FORMAT, "kind": kind, "content": content}, partial)
-    partial.replace(path)
+    buffer = io.BytesIO()
+    torch.save({"format": FORMAT, "kind": kind, "content": content}, buffer)
+    write_durably(path, buffer.getbuffer(), keep)
 
 
 def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "cpu") -> Any:
     """Read what :func:`save_checkpoint` wrote under the same ``kind``.
 
     Raises:
-        InputError: no such file, a truncated or foreign one, or one of another kind.
+        InputError: no such file, a truncated, damaged or foreign one, or one of another kind.
     """
     accepted = f"a checkpoint of kind {kind!r} written by hyuav"
     try:
-        stored = torch.load(path, map_location=device, weights_only=True)
+        stored = _load(Path(path), device)
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})")) from None
     except Exception:  # what unpickling raises on a foreign file is up to its bytes
-        reason = "not a checkpoint, or truncated"
+        reason = "not a checkpoint, truncated or damaged"
         raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})")) from None
     if not isinstance(stored, dict) or stored.get("format") != FORMAT:
         raise InputError(rejection("checkpoint", str(path), f"{accepted} (another program's)"))
@@ -46,6 +54,16 @@ def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "c
         reason = f"this one is of kind {stored.get('kind')!r}"
         raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})"))
     return stored["content"]
+
+
+def _load(path: Path, device: torch.device | str) -> Any:
+    content = io.BytesIO(path.read_bytes())
+    with zipfile.ZipFile(content) as archive:
+        damaged = archive.testzip()  # PyTorch does not compare the checksums that it writes
+    if damaged is not None:
+        raise zipfile.BadZipFile(damaged)
+    content.seek(0)
+    return torch.load(content, map_location=device, weights_only=True)
 
 
 def load_weights_file(path: str | Path) -> dict[str, Tensor]:

@@ -13,11 +13,14 @@ from torchrl.collectors import Collector
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.repetition import BestFlights, as_planned
-from hyuav.learning.replay import favouring_recent, make_replay
+from hyuav.learning.replay import favouring_recent, forget, make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import (
     copy_weights,
     draw_weights,
+    finite_learners,
+    forget_moments,
+    load_weights,
     replace_learners,
     restore_actors,
 )
@@ -105,6 +108,7 @@ class Cohort:
         self._compiled: CompiledSlots | None = None
         self.best_evaluation = torch.full((len(seeds),), -torch.inf, device=self.env.device)
         self.best_weights = copy_weights(self.algorithm.loss)
+        self.stopped = torch.zeros(len(seeds), dtype=torch.int64, device=self.env.device)
 
     def _random_streams(self, seeds: Sequence[int]) -> dict[str, RowStream]:
         size, normals = self.batch_size, sum(step.normals for step in self.algorithm.steps)
@@ -164,6 +168,9 @@ class Cohort:
     def fly(self) -> tuple[Tensor, dict[str, Tensor]]:
         """Fly and learn for one episode.
 
+        A learner whose losses, reward or weights are no longer finite stops: ``stopped`` (N,) is
+        the episode, 0 for those that go on. Its numbers do not count any more.
+
         Returns:
             the accumulated reward (N,) in bps/Hz, and each gradient step's mean loss (N,).
         """
@@ -173,7 +180,22 @@ class Cohort:
         self.algorithm.parameters.memory.finish_episode(self.replay, self.scenario.num_slots)
         if self.algorithm.parameters.repeat_every:
             self.best_flights.keep(flown[0], self.replay)
+        self._stop_where_not_finite(*flown)
         return flown
+
+    def _stop_where_not_finite(self, reward: Tensor, losses: dict[str, Tensor]) -> None:
+        finite = finite_learners(self.algorithm.loss) & reward.isfinite()
+        for loss in losses.values():
+            finite &= loss.isfinite()
+        self.stopped = torch.where((self.stopped == 0) & ~finite, self.episode, self.stopped)
+        where = self.stopped > 0
+        if where.any():  # they take part in every product, so they are kept finite
+            own = copy_weights(self.algorithm.loss)
+            replace_learners(own, self.best_weights, where)
+            load_weights(self.algorithm.loss, own)
+            for step in self.algorithm.steps:
+                forget_moments(step.optimizer, where)
+            forget(self.replay, where)
 
     def _fly_compiled(self, compiled: CompiledSlots) -> tuple[Tensor, dict[str, Tensor]]:
         slots, draws = self.scenario.num_slots, self.env.base_env.draws
@@ -244,7 +266,7 @@ class Cohort:
 
         Where it was, and the algorithm restarts, its actor goes on from the best.
         """
-        better = evaluation > self.best_evaluation
+        better = (evaluation > self.best_evaluation) & (self.stopped == 0)
         self.best_evaluation = torch.where(better, evaluation, self.best_evaluation)
         replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
         if self.algorithm.restarts(self.episode):
@@ -264,6 +286,7 @@ class Cohort:
             "best_flights": self.best_flights.state(),
             "best_evaluation": self.best_evaluation,
             "best_weights": self.best_weights,
+            "stopped": self.stopped,
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -280,6 +303,7 @@ class Cohort:
         self.episode, self.updates = state["episode"], state["updates"]
         self.best_flights.set_state(state["best_flights"])
         self.best_evaluation = state["best_evaluation"].to(self.env.device)
+        self.stopped = state["stopped"].to(self.env.device)
         self.best_weights = {
             name: values.to(self.env.device) for name, values in state["best_weights"].items()
         }

@@ -97,6 +97,13 @@ def make_replay(
     )
 
 
+def forget(replay: ReplayBuffer, where: Tensor) -> None:
+    """Overwrite what the learners ``where`` (N,) have stored by zeros."""
+    if len(replay):
+        for values in replay.storage._storage.values(include_nested=True, leaves_only=True):
+            values[:, where] = 0
+
+
 @dataclass(frozen=True)
 class Memory:
     """What a learner keeps of a slot: a transition, as it wants to see it."""

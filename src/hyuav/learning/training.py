@@ -17,7 +17,7 @@ from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.cohort import Cohort, Earned, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
-from hyuav.parameters import Parameters, choice, count, parameter
+from hyuav.parameters import Parameters, choice, count, number, parameter
 from hyuav.recording import COMPILATION_ERRORS, cores, has_compiler
 from hyuav.scenario import Scenario
 
@@ -45,6 +45,8 @@ class TrainingParameters(Parameters):
     cohorts: int = parameter(count(), cores())
     """Groups of learners that are trained at the same time, each on a thread of its own; by default
     one for each core."""
+    checkpoint_every: float = parameter(number(0.0), 20.0, unit="s")
+    """What is lost at most when a training is killed; 0 for a checkpoint after every episode."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -67,6 +69,8 @@ class Episode:
     """(N,) mean loss of the episode's updates, by gradient step; NaN where there was none."""
     evaluation: Earned | None
     """Without noise, in the episodes that end with an evaluation."""
+    learning: tuple[bool, ...]
+    """Whether each learner's numbers count: those of one that has stopped do not."""
 
 
 class Training:
@@ -123,7 +127,7 @@ class Training:
             )
             for members in self._members
         ]
-        self._compiles = False
+        self._can_compile, self._compiles = True, False
 
     @property
     def horizons(self) -> tuple[int, ...]:
@@ -134,6 +138,16 @@ class Training:
     def episode(self) -> int:
         """How many episodes have been flown."""
         return self.cohorts[0].episode
+
+    @property
+    def stopped(self) -> tuple[int, ...]:
+        """In which episode each learner stopped, for want of finite numbers; 0 for none."""
+        return tuple(self._in_order([cohort.stopped for cohort in self.cohorts]).tolist())
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether no episode follows."""
+        return self.episode >= self.parameters.num_episodes or all(self.stopped)
 
     @property
     def steps(self) -> tuple[str, ...]:
@@ -164,11 +178,14 @@ class Training:
         return join_learners([by_learner[index] for index in range(len(self.learners))])
 
     def episodes(self) -> Iterator[Episode]:
-        """Train until ``num_episodes`` are flown; report each episode as it ends."""
-        self._compiles = self._compiling_pays()
+        """Train until ``num_episodes`` are flown; report each episode as it ends.
+
+        A learner whose losses or weights are no longer finite stops, the others go on.
+        """
+        self._compiles = self._can_compile and self._compiling_pays()
         threads = min(len(self.cohorts), self.parameters.cohorts)
         with ThreadPoolExecutor(threads) as pool:
-            while self.episode < self.parameters.num_episodes:
+            while not self.is_finished:
                 yield self._train_episode(pool)
 
     def _train_episode(self, pool: ThreadPoolExecutor) -> Episode:
@@ -187,14 +204,16 @@ class Training:
             accumulated_reward=self._in_order(rewards),
             losses={name: self._in_order(_loss(losses, name, rewards)) for name in self.steps},
             evaluation=self._keep_best() if self._evaluation_is_due() else None,
+            learning=tuple(not episode for episode in self.stopped),
         )
 
     def _compiling_pays(self) -> bool:
+        """Whether to compile; a training that is continued decides as it did when it began."""
         if self.parameters.compile != "auto":
             return self.parameters.compile == "always"
         if not has_compiler(self.cohorts[0].env.device):
             return False
-        episodes = self.parameters.num_episodes - self.episode
+        episodes = self.parameters.num_episodes
         per_slot, per_learner = SECONDS_SAVED
         saved = sum(
             episodes * cohort.scenario.num_slots * (per_slot + per_learner * len(cohort.learners))
@@ -214,7 +233,7 @@ class Training:
                 accepted = f"a working C++ compiler ({reason})"
                 raise InputError(rejection("compile", "always", accepted)) from None
             warnings.warn(f"training goes on without compiling ({reason})", stacklevel=2)
-            self._compiles = False
+            self._can_compile = self._compiles = False
 
     def _evaluation_is_due(self) -> bool:
         last = self.episode == self.parameters.num_episodes
@@ -280,7 +299,10 @@ class Training:
 
         The tensors are the training's own; save them before it goes on.
         """
-        return {"cohorts": [cohort.state_dict() for cohort in self.cohorts]}
+        return {
+            "cohorts": [cohort.state_dict() for cohort in self.cohorts],
+            "can_compile": self._can_compile,
+        }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue where :meth:`state_dict` was taken, in a training made with the same arguments.
@@ -291,6 +313,7 @@ class Training:
         try:
             for cohort, own in zip(self.cohorts, state["cohorts"], strict=True):
                 cohort.load_state_dict(own)
+            self._can_compile = bool(state["can_compile"])
         except (KeyError, RuntimeError, ValueError, TypeError, AttributeError) as error:
             reason = " ".join(str(error).split())
             raise InputError(f"checkpoint: not of a training like this one ({reason})") from None

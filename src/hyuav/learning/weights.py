@@ -51,11 +51,32 @@ def copy_weights(loss: LossModule) -> dict[str, Tensor]:
     }
 
 
+def finite_learners(loss: LossModule) -> Tensor:
+    """Whose weights are all finite numbers: (N,) bool."""
+    return torch.stack(
+        [
+            values.detach().movedim(_learner_axis(values), 0).flatten(1).isfinite().all(dim=1)
+            for values in loss.parameters()
+        ]
+    ).all(dim=0)
+
+
 def replace_learners(weights: dict[str, Tensor], by: dict[str, Tensor], where: Tensor) -> None:
     """Overwrite, in ``weights``, the learners for which ``where`` (N,) is true."""
     for name, values in weights.items():
-        mask = where.reshape(-1, *(1,) * (min(values.ndim, 3) - 1))
-        values.copy_(torch.where(mask, by[name], values))
+        values.copy_(torch.where(_mask(where, values), by[name], values))
+
+
+def _mask(where: Tensor, values: Tensor) -> Tensor:
+    """The learners (N,) in a shape that broadcasts against stacked weights."""
+    return where.reshape(-1, *(1,) * (min(values.ndim, 3) - 1))
+
+
+def forget_moments(optimizer: torch.optim.Optimizer, where: Tensor) -> None:
+    """Let the optimizer know nothing of the gradients of the learners ``where`` (N,)."""
+    for state in optimizer.state.values():
+        for name in ("exp_avg", "exp_avg_sq"):
+            state[name].masked_fill_(_mask(where, state[name]), 0.0)
 
 
 def restore_actors(loss: LossModule, weights: dict[str, Tensor], where: Tensor) -> None:

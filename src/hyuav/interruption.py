@@ -1,0 +1,58 @@
+"""Stopping at a good moment when the system or the user asks to stop."""
+
+import signal
+import threading
+from types import FrameType
+from typing import Any, Self
+
+from hyuav.errors import Interrupted
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interruption:
+    """Remember a request to stop instead of obeying at once; use it as a context manager.
+
+    The first SIGINT or SIGTERM is remembered, the second does what it would have done before. A
+    signal that is ignored stays so. Only the main thread can be interrupted.
+    """
+
+    def __init__(self) -> None:
+        self._former: dict[signal.Signals, Any] = {}
+        self._received: int | None = None
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for each in SIGNALS:
+                if signal.getsignal(each) not in (signal.SIG_IGN, None):
+                    self._former[each] = signal.signal(each, self._remember)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._restore()
+
+    @property
+    def requested(self) -> bool:
+        """Whether to stop."""
+        return self._received is not None
+
+    def raise_if_requested(self, message: str) -> None:
+        """Stop if asked to.
+
+        Args:
+            message: how far it came, in one line.
+
+        Raises:
+            Interrupted: with the message.
+        """
+        if self._received is not None:
+            raise Interrupted(message, self._received)
+
+    def _remember(self, number: int, _: FrameType | None) -> None:
+        self._received = number
+        self._restore()
+
+    def _restore(self) -> None:
+        while self._former:
+            number, handler = self._former.popitem()
+            signal.signal(number, handler)
