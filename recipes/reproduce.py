@@ -6,18 +6,21 @@ python recipes/reproduce.py
 python recipes/reproduce.py scenario=random_disk training.num_episodes=600
 python recipes/reproduce.py seeds=10 num_slots=[10,12,14,16,18,20] also=random_disk
 python recipes/reproduce.py figures=[learning_curves,trajectories]
+python recipes/reproduce.py hydra.run.dir=runs/NAME
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import torch
 from rich.console import Console
 from torch import Tensor
 
-from hyuav.configuration import Config, recipe, section
+from hyuav.configuration import Config, override, recipe, section, telling_how_to_go_on
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
 from hyuav.experiment import (
@@ -26,7 +29,7 @@ from hyuav.experiment import (
     print_results,
     reference_policies,
     select_initial_weights,
-    train,
+    train_or_resume,
 )
 from hyuav.figures.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
 from hyuav.learning.algorithms import DDPG
@@ -78,6 +81,13 @@ class Reproduce(Parameters):
     run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_reproduce_${hydra.runtime.choices.scenario}",
 )
 def main(config: Config, directory: Path) -> None:
+    """Do the main job; the same directory again goes on where it was interrupted."""
+    again = [each for each in sys.argv[1:] if not each.startswith("hydra.run.dir=")]
+    with telling_how_to_go_on(*again, override("hydra.run.dir", directory)):
+        reproduce(config, directory)
+
+
+def reproduce(config: Config, directory: Path) -> None:
     """Train the three learned schemes side by side, evaluate them all, draw the figures."""
     options = section(config, Reproduce)
     torch.set_num_threads(options.threads)
@@ -99,7 +109,7 @@ def main(config: Config, directory: Path) -> None:
 
     run = work.train(directory, _over_horizons(own, (scenario.num_slots, *others)))
     as_in_paper = dataclasses.replace(own, algorithm_name="ddpg", algorithm=DDPG())
-    weights = _candidates(as_in_paper, options, console)
+    weights = partial(_candidates, as_in_paper, options, console)
     paper_run = work.train(directory / AS_IN_PAPER, as_in_paper, weights)
     paper = learned_policies([paper_run], scenario, LEARNED_AS_IN_PAPER)
     evaluations = [work.evaluate(run, scenario, run.path, paper)]
@@ -136,10 +146,10 @@ class Work:
         self,
         path: Path,
         configuration: RunConfiguration,
-        initial_weights: dict[str, Tensor] | None = None,
+        initial_weights: Callable[[], dict[str, Tensor] | None] = lambda: None,
     ) -> RunDirectory:
-        """Train into a new run directory."""
-        return train(
+        """Train, or go on with the training that was interrupted."""
+        return train_or_resume(
             path,
             configuration,
             self.logger,

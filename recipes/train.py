@@ -11,13 +11,21 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
-from hyuav.configuration import Config, recipe, section
+from hyuav.configuration import (
+    Config,
+    given,
+    override,
+    recipe,
+    section,
+    telling_how_to_go_on,
+)
+from hyuav.errors import InputError, rejection
 from hyuav.experiment import resume, saved_weights, train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import Parameters, choice, count, one_or_more, optional, parameter, text
 from hyuav.report.page import write_run_report
-from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.runs import RunConfiguration, RunDirectory, mapping
 from hyuav.system import SCHEMES
 from hyuav.tracking import LoggerParameters
 
@@ -51,12 +59,12 @@ class Train(Parameters):
 def main(config: Config, directory: Path) -> None:
     """Train, and say where the run is."""
     options = section(config, Train)
-    torch.set_num_threads(options.threads)
-    logger, console = LoggerParameters.from_dict(config["logger"]), Console()
     if options.resume is not None:
         directory.rmdir()  # which Hydra made for a new training
-        tell(resume(options.resume, logger, console, device=options.device), console)
+        go_on(options.resume, config)
         return
+    torch.set_num_threads(options.threads)
+    logger, console = LoggerParameters.from_dict(config["logger"]), Console()
     learners = [
         Learner(scheme, options.seed + index, num_slots)
         for scheme in options.scheme
@@ -64,22 +72,46 @@ def main(config: Config, directory: Path) -> None:
         for index in range(options.learners)
     ]
     configuration = RunConfiguration.from_dict({**config, "learners": learners})
-    run = train(
-        directory,
-        configuration,
-        logger,
-        console,
-        device=options.device,
-        request=config,
-        initial_weights=None if options.warm_start is None else saved_weights(options.warm_start),
-    )
+    weights = None if options.warm_start is None else saved_weights(options.warm_start)
+    with telling_how_to_go_on(override("resume", directory)):
+        run = train(
+            directory,
+            configuration,
+            logger,
+            console,
+            device=options.device,
+            request=config,
+            initial_weights=weights,
+        )
+    tell(run, console)
+
+
+def go_on(path: str, config: Config) -> None:
+    """Go on with a training as it was configured; the place to compute and to log may change.
+
+    Raises:
+        InputError: there is none, or something else was asked for beside it.
+    """
+    for name in given() - {"resume", "device", "threads"}:
+        if not name.startswith("logger."):
+            accepted = "nothing beside it but device, threads and logger"
+            raise InputError(f"{rejection('resume', path, accepted)}, not {name}")
+    begun = {**config, **RunDirectory(path).request()}
+    for name in given() & {"device", "threads"}:
+        begun[name] = config[name]
+    options = section({**begun, "resume": path}, Train)
+    own = {name: value for name, value in config["logger"].items() if f"logger.{name}" in given()}
+    logger = LoggerParameters.from_dict({**mapping("logger", begun["logger"]), **own})
+    torch.set_num_threads(options.threads)
+    console = Console()
+    with telling_how_to_go_on(override("resume", Path(path))):
+        run = resume(path, logger, console, device=options.device)
     tell(run, console)
 
 
 def tell(run: RunDirectory, console: Console) -> None:
     """Print what a run's learners have reached, and where it is."""
-    learners = len(run.configuration().learners)
-    best = run.metrics()["best_evaluation"].dropna().tail(learners)
+    best = run.metrics().groupby("learner")["best_evaluation"].last()
     returns = ", ".join(f"{value:.2f}" for value in best)
     console.print(f"best noise-free accumulated reward (bps/Hz): {returns}", soft_wrap=True)
     console.print(f"run: {run.path}", soft_wrap=True)

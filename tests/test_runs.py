@@ -7,9 +7,9 @@ from hyuav import InputError, Scenario
 from hyuav.learning.algorithms import ALGORITHMS, SAC, TD3
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
+from hyuav.metrics_file import MetricsFile
 from hyuav.runs import (
     METRIC_COLUMNS,
-    MetricsFile,
     RunConfiguration,
     RunDirectory,
     named_algorithm,

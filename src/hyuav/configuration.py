@@ -4,8 +4,12 @@ import argparse
 import dataclasses
 import logging
 import os
+import re
+import shlex
+import signal
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 from unittest import mock
@@ -17,7 +21,7 @@ from hydra.errors import ConfigCompositionException, HydraException, MissingConf
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from hyuav.errors import InputError, require_choice
+from hyuav.errors import Halted, InputError, Interrupted, require_choice
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.parameters import Parameters, refuse_unknown
 from hyuav.scenario import PRESETS, Scenario
@@ -110,9 +114,12 @@ def recipe(
                 if composed:
                     raise
                 _refuse(explain(error))
-            except KeyboardInterrupt:
-                print("interrupted", file=sys.stderr)
-                sys.exit(130)
+            except KeyboardInterrupt as error:
+                print(str(error) or "interrupted", file=sys.stderr)
+                sys.exit(128 + (error.signal if isinstance(error, Interrupted) else signal.SIGINT))
+            except Halted as error:
+                print(f"error: {error}", file=sys.stderr)
+                sys.exit(1)
 
         return command
 
@@ -130,6 +137,51 @@ def _plain(config: DictConfig, groups: Iterable[str]) -> Config:
 def _remove_if_empty(directory: Path) -> None:
     if directory.is_dir() and not any(directory.iterdir()) and directory.resolve() != Path.cwd():
         directory.rmdir()
+
+
+def given() -> set[str]:
+    """The names of the entries that the command line set."""
+    overrides = HydraConfig.get().overrides.task
+    return {override.partition("=")[0].lstrip("+~") for override in overrides}
+
+
+@contextmanager
+def telling_how_to_go_on(*overrides: str) -> Iterator[None]:
+    """Let whoever interrupts what is done inside know the command that goes on with it.
+
+    Args:
+        overrides: with which to call the same recipe.
+
+    Raises:
+        Interrupted: in place of any other interruption, with the command.
+        Halted: with the command where going on is possible.
+    """
+    hint = f"go on with: {shlex.join([sys.orig_argv[0], sys.argv[0], *overrides])}"
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        number = error.signal if isinstance(error, Interrupted) else signal.SIGINT
+        raise Interrupted(f"{str(error) or 'interrupted'}; {hint}", number) from None
+    except Halted as error:
+        if not error.resumable:
+            raise
+        raise Halted(f"{error}; {hint}") from None
+
+
+def override(name: str, path: Path) -> str:
+    """What sets an entry to a path on the command line, in quotation marks where it needs them.
+
+    Args:
+        name: of the entry.
+        path: told from the working directory if it is below.
+    """
+    absolute = path.absolute()
+    below = absolute.is_relative_to(Path.cwd())
+    value = str(absolute.relative_to(Path.cwd()) if below else absolute)
+    if not re.fullmatch(r"[A-Za-z./_][\w./:+-]*/[\w./:+-]*", value):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        value = f'"{escaped}"'
+    return f"{name}={value}"
 
 
 def section(config: Config, parameters: type[Record]) -> Record:

@@ -29,7 +29,16 @@ class Interrupted(KeyboardInterrupt):
 
 
 class Halted(Exception):  # noqa: N818 - nothing was wrong with what was asked for
-    """A training cannot go on, for want of space or of numbers; the message is one line."""
+    """A training cannot go on, for want of space perhaps; the message is one line.
+
+    Args:
+        message: the line.
+        resumable: whether it can go on when the cause has been removed.
+    """
+
+    def __init__(self, message: str, *, resumable: bool = True) -> None:
+        super().__init__(message)
+        self.resumable = resumable
 
 
 def rejection(name: str, value: object, accepted: str) -> str:

@@ -9,20 +9,22 @@ import torch
 from rich.console import Console
 from torch import Tensor
 
-from hyuav.errors import InputError, rejection
+from hyuav.errors import Halted, InputError, rejection
 from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
+from hyuav.interruption import Interruption
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.checkpoint import load_checkpoint, load_weights_file
+from hyuav.learning.checkpoint import load_weights_file
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training
 from hyuav.learning.weights import count_learners, join_learners, select_learner
-from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.runs import RunConfiguration, RunDirectory, require_writable
 from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
 from hyuav.schemes.linear import ConstantVelocity, ja_lt, re_lt
 from hyuav.schemes.optimum import FlightPolicy, solve
 from hyuav.terminal import print_table, results_table
 from hyuav.tracking import LoggerParameters, Tracker
+from hyuav.tracking.checkpoints import Reported, first_checkpoint, restore
 
 LEARNED = {"hybrid": "proposed", "relay": "re_ot", "jamming": "ja_ot"}
 """The learned scheme for each rule of who chooses the mode."""
@@ -58,14 +60,17 @@ def train(
 
     Raises:
         InputError: the directory is taken, or the checkpoint does not fit.
+        Interrupted: a signal asked to stop; :func:`resume` goes on.
+        Halted: the training cannot go on.
     """
     training = _training(configuration, device)
     if initial_weights is not None:
         training.warm_start(initial_weights)
-    run = RunDirectory.create(directory, configuration, request)
-    with Tracker(run, configuration, training, logger, console, logs) as tracker:
-        for episode in training.episodes():
-            tracker.log(episode)
+    run = RunDirectory(directory)
+    require_writable("run directory", run.path)
+    with run.reserved():
+        RunDirectory.create(directory, configuration, request, first_checkpoint(training))
+        _train(run, configuration, training, logger, console, logs)
     return run
 
 
@@ -75,26 +80,104 @@ def resume(
     console: Console,
     *,
     device: str | None = None,
+    logs: Path | None = None,
 ) -> RunDirectory:
     """Go on with a training from its last checkpoint, in its directory and its W&B run.
+
+    What comes of it is what would have come of the training without a break.
 
     Args:
         directory: of the run.
         logger: what Weights & Biases gets.
         console: to show progress on.
         device: to train on.
+        logs: directory for the files of Weights & Biases; the run's where it is None.
 
     Raises:
-        InputError: there is no such run, or no checkpoint of it.
+        InputError: there is no such run, or no checkpoint of it, or it cannot be written to.
+        Interrupted: a signal asked to stop.
+        Halted: the training cannot go on.
     """
     run = RunDirectory(directory)
     configuration = run.configuration()
     training = _training(configuration, device)
-    training.load_state_dict(load_checkpoint(run.last_checkpoint, "training"))
-    with Tracker(run, configuration, training, logger, console) as tracker:
-        for episode in training.episodes():
-            tracker.log(episode)
+    require_writable("run directory", run.path)
+    with run.reserved():
+        reported = restore(run, training)
+        _train(run, configuration, training, logger, console, logs, reported)
     return run
+
+
+def _train(
+    run: RunDirectory,
+    configuration: RunConfiguration,
+    training: Training,
+    logger: LoggerParameters,
+    console: Console,
+    logs: Path | None,
+    reported: Reported | None = None,
+) -> None:
+    """Train to the end, or stop after an episode where that is asked for."""
+    episodes = training.parameters.num_episodes
+    with Interruption() as interruption:
+        try:
+            with Tracker(run, configuration, training, logger, console, logs, reported) as tracker:
+                for episode in training.episodes():
+                    tracker.log(episode)
+                    if interruption.requested:
+                        tracker.save()
+                        break
+                interruption.raise_if_requested(
+                    f"interrupted after episode {training.episode} of {episodes}"
+                )
+        except OSError as error:
+            where = f"{error.filename}: " if error.filename else ""
+            line = f"halted after episode {training.episode} of {episodes}: {where}{error.strerror}"
+            raise Halted(f"{line}; the last checkpoint is kept") from error
+        interruption.raise_if_requested("interrupted after the last episode")
+    if all(training.stopped):
+        line = f"halted after episode {training.episode} of {episodes}: every learner has stopped"
+        raise Halted(line, resumable=False)
+
+
+def train_or_resume(
+    directory: str | Path,
+    configuration: RunConfiguration,
+    logger: LoggerParameters,
+    console: Console,
+    *,
+    device: str | None = None,
+    initial_weights: Callable[[], dict[str, Tensor] | None] = lambda: None,
+    request: Mapping[str, Any] | None = None,
+) -> RunDirectory:
+    """Train as configured, or go on with that training where it has begun in the directory.
+
+    Args:
+        directory: of the run.
+        configuration: of the training.
+        logger: what Weights & Biases gets.
+        console: to show progress on.
+        device: to train on.
+        initial_weights: finds what a new training begins with; None for fresh weights.
+        request: all that was asked for, to be kept with a new run.
+
+    Raises:
+        InputError: another training is there, or as :func:`train` and :func:`resume`.
+        Interrupted: a signal asked to stop.
+        Halted: the training cannot go on.
+    """
+    run = RunDirectory(directory)
+    if run.exists and run.configuration() == configuration:
+        return resume(directory, logger, console, device=device)
+    return train(
+        directory,
+        configuration,
+        logger,
+        console,
+        device=device,
+        initial_weights=None if run.exists else initial_weights(),
+        request=request,
+    )
 
 
 def _training(configuration: RunConfiguration, device: str | None) -> Training:

@@ -1,10 +1,12 @@
 """The run directory: configuration, metrics, checkpoints, evaluation and figures of a training."""
 
-import csv
 import dataclasses
+import fcntl
+import os
 import tempfile
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +15,10 @@ import pandas as pd
 from omegaconf import OmegaConf
 from torch import Tensor
 
+from hyuav.durable import create_durably
 from hyuav.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
-from hyuav.learning.checkpoint import load_weights_file
+from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.metrics import IDENTITY, parse_rows
@@ -154,8 +157,9 @@ class RunDirectory:
     """The files of one training.
 
     ``config.yaml``, ``metrics.csv`` (a row per episode and learner), ``checkpoints/last.pt`` (all
-    that evolves), ``checkpoints/best.pt`` (the best weights so far), ``evaluation.json``,
-    ``flights.parquet`` and ``figures/``.
+    that evolves), ``checkpoints/previous.pt`` (the same a little earlier),
+    ``checkpoints/best.pt`` (the best weights so far), ``evaluation.json``, ``flights.parquet``
+    and ``figures/``.
 
     Args:
         path: of the directory.
@@ -166,6 +170,7 @@ class RunDirectory:
         self.config_file = self.path / "config.yaml"
         self.metrics_file = self.path / "metrics.csv"
         self.last_checkpoint = self.path / "checkpoints" / "last.pt"
+        self.previous_checkpoint = self.path / "checkpoints" / "previous.pt"
         self.best_checkpoint = self.path / "checkpoints" / "best.pt"
         self.figures = self.path / "figures"
 
@@ -175,13 +180,15 @@ class RunDirectory:
         path: str | Path,
         configuration: RunConfiguration,
         request: Mapping[str, Any] | None = None,
+        first_checkpoint: dict[str, Any] | None = None,
     ) -> "RunDirectory":
-        """Begin a run directory.
+        """Begin a run directory; it is one as soon as there is a ``config.yaml``.
 
         Args:
             path: of the directory.
             configuration: of the training.
             request: all that was asked for beside it, kept in ``config.yaml`` too.
+            first_checkpoint: that a training can begin with.
 
         Raises:
             InputError: another training's files are there, or the place cannot be written to.
@@ -190,12 +197,45 @@ class RunDirectory:
         require_writable("run directory", run.figures)
         content = OmegaConf.to_yaml({**(request or {}), **configuration.to_dict()})
         try:
-            with run.config_file.open("x", encoding="utf-8") as file:
-                file.write(content)
+            if first_checkpoint is not None and not run.exists:
+                save_checkpoint(run.last_checkpoint, "training", first_checkpoint)
+            create_durably(run.config_file, content.encode())
         except FileExistsError:
             accepted = "one without a run in it"
             raise InputError(rejection("run directory", str(path), accepted)) from None
+        except OSError as error:
+            accepted = f"a writable place ({error.strerror})"
+            raise InputError(rejection("run directory", str(path), accepted)) from None
         return run
+
+    @property
+    def exists(self) -> bool:
+        """Whether a training has begun here."""
+        return self.config_file.exists()
+
+    @contextmanager
+    def reserved(self) -> Iterator[None]:
+        """Let no other process train here meanwhile; a process that is killed reserves nothing.
+
+        Where the file system cannot lock a directory, nobody is kept away.
+
+        Raises:
+            InputError: another process trains here.
+        """
+        self.path.mkdir(parents=True, exist_ok=True)
+        directory = os.open(self.path, os.O_RDONLY)
+        try:
+            fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(directory)
+            accepted = "one in which no other process trains"
+            raise InputError(rejection("run directory", str(self.path), accepted)) from None
+        except OSError:
+            pass
+        try:
+            yield
+        finally:
+            os.close(directory)
 
     def configuration(self) -> RunConfiguration:
         """What the training was asked to do.
@@ -203,12 +243,19 @@ class RunDirectory:
         Raises:
             InputError: there is no run here, or its ``config.yaml`` is not one.
         """
+        return RunConfiguration.from_dict(self.request())
+
+    def request(self) -> dict[str, Any]:
+        """All that was asked for, in plain values.
+
+        Raises:
+            InputError: there is no run here.
+        """
         try:
-            values = read_yaml(self.config_file)
+            return read_yaml(self.config_file)
         except InputError as error:
             accepted = f"a run directory with a config.yaml ({error})"
             raise InputError(rejection("run", str(self.path), accepted)) from None
-        return RunConfiguration.from_dict(values)
 
     def best_weights(self) -> dict[str, Tensor]:
         """The best weights so far of all learners.
@@ -241,26 +288,3 @@ def readable_metrics(path: str | Path) -> pd.DataFrame:
     told = set(IDENTITY) <= set(columns)
     rows = parse_rows(lines, columns) if told else parse_rows(b"", METRIC_COLUMNS)
     return rows.reindex(columns=list(dict.fromkeys([*METRIC_COLUMNS, *rows.columns])))
-
-
-class MetricsFile:
-    """``metrics.csv``, to which rows are appended as training goes on.
-
-    Args:
-        path: of the file, which is begun anew.
-        columns: in their order.
-    """
-
-    def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
-        self._file = path.open("w", newline="", encoding="utf-8")
-        self._writer = csv.DictWriter(self._file, columns, restval="")
-        self._writer.writeheader()
-
-    def append(self, rows: list[dict[str, Any]]) -> None:
-        """Add rows; they can be read at once."""
-        self._writer.writerows(rows)
-        self._file.flush()
-
-    def close(self) -> None:
-        """No more rows follow."""
-        self._file.close()

@@ -4,7 +4,8 @@ import pytest
 
 from hyuav.dashboard.growing import GrowingMetrics
 from hyuav.errors import InputError
-from hyuav.runs import METRIC_COLUMNS, MetricsFile
+from hyuav.metrics_file import MetricsFile
+from hyuav.runs import METRIC_COLUMNS
 
 HEADER = ",".join(METRIC_COLUMNS) + "\n"
 

@@ -17,6 +17,7 @@ from typing import Any, Self
 import wandb
 from rich.console import Console
 
+from hyuav.durable import write_durably
 from hyuav.errors import InputError
 from hyuav.tracking.parameters import LoggerParameters
 
@@ -61,7 +62,7 @@ class Session:
         self._job_type, self._console = job_type, console
         self._memory = memory
         self._run: wandb.Run | None = None
-        known = {} if memory is None else remembered(memory)
+        known = {} if memory is None or logger.id else remembered(memory)
         self._id: str | None = logger.id or known.get("id")
 
     def __enter__(self) -> Self:
@@ -81,6 +82,11 @@ class Session:
         else:
             hint = f"W&B: {run.url}"
         self._console.print(hint, soft_wrap=True, markup=False, highlight=False)
+
+    @property
+    def id(self) -> str | None:
+        """Of the W&B run; None where there never was one."""
+        return self._id
 
     def attempt(self, action: Callable[[wandb.Run], object]) -> None:
         """Do something with the run; if that fails, say so and do nothing more with it.
@@ -189,7 +195,7 @@ class Session:
             "group": run.group or None,
         }
         file = self._memory / MEMORY_FILE
-        file.write_text(f"{json.dumps(identity, indent=2)}\n", encoding="utf-8")
+        write_durably(file, f"{json.dumps(identity, indent=2)}\n".encode())
 
 
 def _settings(mode: str) -> wandb.Settings:

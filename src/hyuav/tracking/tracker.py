@@ -1,7 +1,8 @@
 """Reporting a training: metrics and checkpoints in its directory, W&B, progress on a terminal."""
 
-import csv
+import dataclasses
 import math
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,11 +12,12 @@ from typing import Any, Self
 import wandb
 from rich.console import Console
 
-from hyuav.learning.checkpoint import save_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Episode, Training
-from hyuav.runs import METRIC_COLUMNS, MetricsFile, RunConfiguration, RunDirectory
+from hyuav.metrics_file import MetricsFile
+from hyuav.runs import METRIC_COLUMNS, RunConfiguration, RunDirectory
 from hyuav.terminal import TrainingProgress
+from hyuav.tracking.checkpoints import Reported, save_checkpoints
 from hyuav.tracking.parameters import LoggerParameters
 from hyuav.tracking.session import Session
 
@@ -29,9 +31,6 @@ SUMMARIES = {
     "best_evaluation": "max",
 }
 """What a run's summary keeps of each learner's metrics; of its losses, the least and the last."""
-
-SECONDS_BETWEEN_CHECKPOINTS = 20.0
-"""At least; a checkpoint holds all replays, of tens of megabytes."""
 
 
 def learner_names(learners: Sequence[Learner], horizons: Sequence[int]) -> list[str]:
@@ -50,9 +49,9 @@ class Tracker:
     """Report every episode of a training; use it as a context manager.
 
     Metrics go to ``metrics.csv`` and, under the same names, to Weights & Biases. Checkpoints are
-    written with evaluations, and at the end. A progress bar with the current return and the time
-    left is shown on terminals only. Where the directory already has metrics, those of the episodes
-    that the training has flown are kept, and the same W&B run goes on.
+    written every ``checkpoint_every`` seconds, and at the end. A progress bar with the current
+    return and the time left is shown on terminals only. A learner that stops is told of on the
+    standard error, and has no rows any more.
 
     Args:
         run: the training's directory.
@@ -61,6 +60,11 @@ class Tracker:
         logger: what Weights & Biases gets.
         console: to show progress on.
         logs: directory for the files of Weights & Biases; the run's where it is None.
+        reported: what was before the training was interrupted: later metrics are dropped, and the
+            same W&B run goes on.
+
+    Raises:
+        OSError: the metrics cannot be written.
     """
 
     def __init__(
@@ -71,18 +75,19 @@ class Tracker:
         logger: LoggerParameters,
         console: Console,
         logs: Path | None = None,
+        reported: Reported | None = None,
     ) -> None:
         self.run, self.training = run, training
         self.names = learner_names(training.learners, training.horizons)
         self._axes = _slot_axes(self.names, training.horizons)
         self._configuration = configuration
-        kept = _kept_rows(run.metrics_file, training.episode)
+        reported = reported or Reported()
         steps = tuple(f"loss_{name}" for name in training.steps)
-        self._metrics = MetricsFile(run.metrics_file, (*METRIC_COLUMNS, *steps))
-        self._metrics.append(kept)
+        columns = (*METRIC_COLUMNS, *steps)
+        self._metrics = MetricsFile(run.metrics_file, columns, reported.metrics)
         self._session = Session(
             run.path if logs is None else logs,
-            logger,
+            dataclasses.replace(logger, id=logger.id or reported.wandb_id),
             configuration.to_dict(),
             "train",
             console=console,
@@ -91,8 +96,9 @@ class Tracker:
         self._progress = TrainingProgress(
             console, training.parameters.num_episodes, training.episode
         )
-        self._started = time.perf_counter() - (float(kept[-1]["seconds"]) if kept else 0.0)
-        self._saved = -math.inf
+        self._started = time.perf_counter() - reported.seconds
+        self._saved = time.perf_counter()
+        self._stopped = {index for index, episode in enumerate(training.stopped) if episode}
 
     def __enter__(self) -> Self:
         self._session.__enter__()
@@ -122,20 +128,39 @@ class Tracker:
 
     def log(self, episode: Episode) -> None:
         """Report one episode of all learners."""
+        self._tell_who_stopped(episode)
         rows = self._rows(episode)
-        self._metrics.append(rows)
-        self._session.log(_by_learner(self.names, self._axes, rows), episode.number)
-        last = episode.number == self.training.parameters.num_episodes
-        waited = time.perf_counter() - self._saved >= SECONDS_BETWEEN_CHECKPOINTS
-        if episode.evaluation is not None and (waited or last):
+        if rows:
+            self._metrics.append(rows)
+            self._session.log(_by_learner(self.names, self._axes, rows), episode.number)
+        waited = time.perf_counter() - self._saved
+        if waited >= self.training.parameters.checkpoint_every or self.training.is_finished:
             self.save()
-        self._progress.update(episode.number, episode.accumulated_reward.tolist())
+        self._progress.update(episode.number, [row["accumulated_reward"] for row in rows])
 
     def save(self) -> None:
-        """Write the checkpoints."""
-        save_checkpoint(self.run.last_checkpoint, "training", self.training.state_dict())
-        save_checkpoint(self.run.best_checkpoint, "weights", self.training.best_weights)
+        """Write the checkpoints.
+
+        Raises:
+            OSError: they cannot be written; the last ones are still there.
+        """
+        self._metrics.sync()  # a checkpoint may count on all rows before it
         self._saved = time.perf_counter()
+        seconds = self._saved - self._started
+        reported = Reported(self._metrics.position, seconds, self._session.id)
+        save_checkpoints(self.run, self.training, reported)
+
+    def _tell_who_stopped(self, episode: Episode) -> None:
+        for index, learning in enumerate(episode.learning):
+            if not learning and index not in self._stopped:
+                self._stopped.add(index)
+                horizon, last = self.training.horizons[index], episode.slots[index]
+                print(
+                    f"learner {index} ({self.names[index]}) stops in episode {episode.number}, "
+                    f"slots {last - horizon + 1} to {last}: its losses or weights are not finite; "
+                    "its best weights before that are kept",
+                    file=sys.stderr,
+                )
 
     def _define_metrics(self, run: wandb.Run) -> None:
         """Rewards against episodes; losses against slots, in each of which there is an update."""
@@ -175,6 +200,7 @@ class Tracker:
                 if not math.isnan(values[index])  # before the first update there is no loss
             }
             for index, learner in enumerate(self.training.learners)
+            if episode.learning[index]
         ]
 
 
@@ -190,21 +216,14 @@ def _by_learner(
 ) -> dict[str, Any]:
     """The rows' measurements as one flat record: ``hybrid/accumulated_reward`` and so on.
 
-    ``best_evaluation`` is the mean over the learners.
+    ``best_evaluation`` is the mean over the learners that have not stopped.
     """
     record: dict[str, Any] = {"episode": rows[0]["episode"], "seconds": rows[0]["seconds"]}
-    for name, axis, row in zip(names, axes, rows, strict=True):
+    for row in rows:
+        name, axis = names[row["learner"]], axes[row["learner"]]
         record[axis] = row["slots"]
         record |= {
             f"{name}/{column}": value for column, value in row.items() if column not in _IDENTITY
         }
     best = [row["best_evaluation"] for row in rows if "best_evaluation" in row]
     return record | ({"best_evaluation": sum(best) / len(best)} if best else {})
-
-
-def _kept_rows(file: Path, episodes: int) -> list[dict[str, Any]]:
-    """Of an interrupted training, the rows of the episodes that its checkpoint knows of."""
-    if not file.exists():
-        return []
-    with file.open(newline="", encoding="utf-8") as rows:
-        return [row for row in csv.DictReader(rows) if int(row["episode"]) <= episodes]
