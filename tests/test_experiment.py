@@ -63,7 +63,7 @@ def test_a_resumed_training_brings_what_an_unbroken_one_does(tmp_path: Path) -> 
     run.config_file.write_text(config.replace("num_episodes: 4", "num_episodes: 6"))
     metrics = resume(run.path, OFF, SILENT).metrics()
     pd.testing.assert_frame_equal(
-        metrics.drop(columns="seconds"), expected.drop(columns="seconds"), rtol=1e-4
+        metrics.drop(columns="seconds"), expected.drop(columns="seconds"), check_exact=True
     )
 
 

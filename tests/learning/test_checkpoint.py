@@ -7,6 +7,7 @@ import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from faults import small_disk
 from hyuav.errors import InputError
 from hyuav.learning.checkpoint import load_checkpoint, load_weights_file, save_checkpoint
 
@@ -23,20 +24,35 @@ def test_a_checkpoint_holds_tensors_and_plain_values(tmp_path: Path) -> None:
     assert loaded == content
 
 
-def test_an_interrupted_write_leaves_the_last_checkpoint(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("fault", ["full", "read_only"])
+def test_a_disk_that_refuses_leaves_the_last_checkpoints(tmp_path: Path, fault: str) -> None:
+    with small_disk(tmp_path / "disk") as disk:
+        file, before = disk.path / "last.pt", disk.path / "previous.pt"
+        for slots in (1, 2):
+            save_checkpoint(file, "training", {"slots": slots}, keep=before)
+        with getattr(disk, fault)(), pytest.raises(OSError, match=r"last\.pt"):
+            save_checkpoint(file, "training", {"weights": torch.zeros(10_000)}, keep=before)
+        assert load_checkpoint(file, "training") == {"slots": 2}
+        assert load_checkpoint(before, "training") == {"slots": 1}
+        assert {path.name for path in disk.path.iterdir()} == {"last.pt", "previous.pt"}
+
+
+def test_the_checkpoint_before_is_kept_where_that_is_wanted(tmp_path: Path) -> None:
+    file, before = tmp_path / "last.pt", tmp_path / "previous.pt"
+    for slots in (1, 2, 3):
+        save_checkpoint(file, "training", {"slots": slots}, keep=before)
+    assert load_checkpoint(file, "training") == {"slots": 3}
+    assert load_checkpoint(before, "training") == {"slots": 2}
+
+
+@pytest.mark.parametrize("place", [0.3, 0.5, 0.7])
+def test_a_checkpoint_in_which_one_bit_is_wrong_is_refused(tmp_path: Path, place: float) -> None:
     file = tmp_path / "last.pt"
-    save_checkpoint(file, "training", {"slots": 1})
-
-    def fill_the_disk(_: Any, path: Path) -> None:
-        path.write_bytes(b"half a checkpoint")
-        raise OSError("No space left on device")
-
-    monkeypatch.setattr(torch, "save", fill_the_disk)
-    with pytest.raises(OSError, match="No space"):
-        save_checkpoint(file, "training", {"slots": 2})
-    assert load_checkpoint(file, "training") == {"slots": 1}
+    save_checkpoint(file, "training", {"weights": torch.randn(100, 100)})
+    content = bytearray(file.read_bytes())
+    content[int(place * len(content))] ^= 1
+    file.write_bytes(content)
+    refusal(file)
 
 
 def refusal(path: Path, kind: str = "training") -> str:

@@ -20,6 +20,8 @@ from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.tracking import LoggerParameters, Tracker, learner_names
+from hyuav.tracking.checkpoints import restore
+from hyuav.tracking.session import remembered
 from offline_wandb import history, logged_history, offline_runs, recorded, summary
 
 CONFIGURATION = RunConfiguration(
@@ -75,7 +77,7 @@ def test_metrics_are_kept_as_columns_a_row_per_episode_and_learner(tmp_path: Pat
 def test_checkpoints_are_written(tmp_path: Path) -> None:
     training = track(tmp_path, "disabled")
     run = RunDirectory(tmp_path)
-    state = load_checkpoint(run.last_checkpoint, "training")
+    state = load_checkpoint(run.last_checkpoint, "training")["training"]
     assert [cohort["episode"] for cohort in state["cohorts"]] == [5] * len(training.cohorts)
     best = run.best_weights()
     assert all(torch.equal(best[name], training.best_weights[name]) for name in best)
@@ -153,8 +155,12 @@ def test_a_training_that_goes_on_continues_the_same_run(tmp_path: Path) -> None:
         csv.writer(file).writerow([6, 120, 0, "hybrid", 0, 20, 1.0])
     longer = dataclasses.replace(CONFIGURATION.training, num_episodes=8)
     again = Training(CONFIGURATION.scenario, training.learners, CONFIGURATION.algorithm, longer)
-    again.load_state_dict(load_checkpoint(run.last_checkpoint, "training"))
-    with Tracker(run, CONFIGURATION, again, LoggerParameters(), silent()) as tracker:
+    reported = restore(run, again)
+    assert reported.wandb_id == remembered(run.path)["id"]
+    (run.path / "wandb.json").unlink()  # it is in the checkpoint, too
+    with Tracker(
+        run, CONFIGURATION, again, LoggerParameters(), silent(), reported=reported
+    ) as tracker:
         for episode in again.episodes():
             tracker.log(episode)
     metrics = run.metrics()

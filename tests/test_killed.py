@@ -1,0 +1,94 @@
+"""Trainings that are killed at random moments and resumed end as one that was not."""
+
+import json
+import random
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from hyuav.learning.checkpoint import load_checkpoint
+from hyuav.runs import RunConfiguration, RunDirectory
+from killed_training import differences, outcome, process, small
+
+MEASURED = Path("runs/reliability")
+"""Where the figures of docs/reliability.md are written."""
+
+
+def run_to_the_end(directory: Path, configuration: RunConfiguration) -> float:
+    """Seconds that it took."""
+    started = time.monotonic()
+    running = process(directory, configuration)
+    running.start()
+    running.join()
+    assert running.exitcode == 0
+    return time.monotonic() - started
+
+
+def kill_after(seconds: float, directory: Path, configuration: RunConfiguration) -> bool:
+    """Whether it was still alive to be killed."""
+    running = process(directory, configuration)
+    running.start()
+    running.join(seconds)
+    running.kill()
+    running.join()
+    return running.exitcode != 0
+
+
+def stage(directory: Path) -> str:
+    """What was found after a kill."""
+    run = RunDirectory(directory)
+    if not run.exists:
+        return "before the run was there"
+    if not run.last_checkpoint.exists():
+        return "between two checkpoints' names"
+    (first, *_) = load_checkpoint(run.last_checkpoint, "training")["training"]["cohorts"]
+    episodes = run.configuration().training.num_episodes
+    if first["episode"] == 0:
+        return "before the first later checkpoint"
+    if first["episode"] <= run.configuration().algorithm.warm_up_episodes:
+        return "in the warm-up"
+    return "after the last episode" if first["episode"] == episodes else "later"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("compiled", "kills"), [("never", 50), ("always", 12)])
+def test_a_killed_training_ends_with_the_numbers_of_an_unbroken_one(
+    compiled: str, kills: int, tmp_path: Path
+) -> None:
+    configuration = small(compiled)
+    run_to_the_end(tmp_path / "warm", configuration)  # what is compiled is kept on the disk
+    lifetime = run_to_the_end(tmp_path / "unbroken", configuration)
+    expected = outcome(tmp_path / "unbroken")
+    luck, stages, torn = random.Random(0), Counter[str](), 0
+    for number in range(kills):
+        directory = tmp_path / f"killed-{number}"
+        moment = (number + luck.random()) / kills * lifetime
+        while not kill_after(moment, directory, configuration):
+            moment, directory = 0.9 * moment, directory.with_name(f"{directory.name}-again")
+        stages[stage(directory)] += 1
+        torn += any(directory.rglob("*.partial"))
+        run_to_the_end(directory, configuration)
+        assert differences(outcome(directory), expected) == []
+    figures = {
+        "kills": kills,
+        "ended as the unbroken training": kills,
+        "while a file was being written": torn,
+        "numbers and rows compared each time": len(expected),
+        "stages": dict(stages),
+    }
+    MEASURED.mkdir(parents=True, exist_ok=True)
+    file = MEASURED / f"kills_compile_{compiled}.json"
+    file.write_text(f"{json.dumps(figures, indent=2)}\n")
+
+
+@pytest.mark.slow
+def test_a_training_that_is_killed_again_and_again_ends_so_too(tmp_path: Path) -> None:
+    configuration = small("never")
+    lifetime = run_to_the_end(tmp_path / "unbroken", configuration)
+    luck, killed = random.Random(1), 0
+    while kill_after(luck.uniform(0.3, 0.6) * lifetime, tmp_path / "killed", configuration):
+        killed += 1
+    assert killed > 0
+    assert differences(outcome(tmp_path / "killed"), outcome(tmp_path / "unbroken")) == []
