@@ -13,7 +13,7 @@ from torchrl.collectors import Collector
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.repetition import BestFlights, as_planned
-from hyuav.learning.replay import favouring_recent, forget, make_replay
+from hyuav.learning.replay import clear_unused, favouring_recent, forget, make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import (
     copy_weights,
@@ -274,6 +274,7 @@ class Cohort:
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that evolves; the tensors are the cohort's own."""
+        clear_unused(self.replay)
         return {
             "modules": self.algorithm.modules.state_dict(),
             "optimizers": [step.optimizer.state_dict() for step in self.algorithm.steps],

@@ -97,6 +97,13 @@ def make_replay(
     )
 
 
+def clear_unused(replay: ReplayBuffer) -> None:
+    """Overwrite by zeros what no transition has been stored in: it is whatever was in memory."""
+    if len(replay):
+        for values in replay.storage._storage.values(include_nested=True, leaves_only=True):
+            values[len(replay) :] = 0
+
+
 def forget(replay: ReplayBuffer, where: Tensor) -> None:
     """Overwrite what the learners ``where`` (N,) have stored by zeros."""
     if len(replay):

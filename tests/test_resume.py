@@ -1,0 +1,232 @@
+"""A training that is interrupted, or whose files are damaged, and goes on."""
+
+import dataclasses
+import io
+import math
+import os
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+import torch
+from rich.console import Console
+
+from faults import small_disk
+from hyuav import InputError
+from hyuav.errors import Halted
+from hyuav.experiment import resume, train, train_or_resume
+from hyuav.interruption import Interruption
+from hyuav.learning.training import Training
+from hyuav.runs import RunConfiguration, RunDirectory
+from killed_training import OFF, differences, outcome, small
+
+SILENT = Console(file=io.StringIO())
+
+
+def every_episode(num_episodes: int) -> RunConfiguration:
+    """With a checkpoint after each."""
+    configuration = small("never", num_episodes)
+    training = dataclasses.replace(configuration.training, checkpoint_every=0.0)
+    return dataclasses.replace(configuration, training=training)
+
+
+def interrupt(directory: Path) -> RunDirectory:
+    """A training of 6 episodes, of which 3 are flown."""
+    run = train(directory, every_episode(3), OFF, SILENT)
+    config = run.config_file.read_text()
+    run.config_file.write_text(config.replace("num_episodes: 3", "num_episodes: 6"))
+    return run
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return train(tmp_path_factory.mktemp("whole") / "run", every_episode(6), OFF, SILENT).path
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return interrupt(tmp_path_factory.mktemp("part") / "run").path
+
+
+@pytest.fixture
+def run(interrupted: Path, tmp_path: Path) -> RunDirectory:
+    shutil.copytree(interrupted, tmp_path / "run")
+    return RunDirectory(tmp_path / "run")
+
+
+def cut(path: Path, share: float) -> None:
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+
+
+def spoil(path: Path, line: int) -> None:
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join([*lines[:line], b"\x00what,is,this\n", *lines[line + 1 :]]))
+
+
+def test_going_on_ends_with_the_numbers_of_an_unbroken_training(
+    run: RunDirectory, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with run.metrics_file.open("a") as file:  # logged after the last checkpoint, and cut off
+        file.write("4,24,0,hybrid,3,6,1.5,,,,0.1,0.2,0.3\n4,24,1,rel")
+    resume(run.path, OFF, SILENT)
+    assert differences(outcome(run.path), outcome(unbroken)) == []
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("fault", ["cut", "missing", "metrics cut", "metrics spoilt"])
+def test_what_is_damaged_is_told_and_the_checkpoint_before_goes_on_to_the_same_end(
+    run: RunDirectory, unbroken: Path, capsys: pytest.CaptureFixture[str], fault: str
+) -> None:
+    if fault == "cut":
+        cut(run.last_checkpoint, 0.7)
+    elif fault == "missing":
+        run.last_checkpoint.unlink()
+    elif fault == "metrics cut":
+        cut(run.metrics_file, 0.99)
+    else:
+        spoil(run.metrics_file, line=9)  # of the third episode
+    resume(run.path, OFF, SILENT)
+    assert differences(outcome(run.path), outcome(unbroken)) == []
+    reason, end = capsys.readouterr().err.splitlines()
+    assert (run.metrics_file if "metrics" in fault else run.last_checkpoint).name in reason
+    assert end == "going on after episode 2"
+
+
+def test_rows_that_no_checkpoint_can_bring_back_are_all_that_is_lost(
+    run: RunDirectory, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoil(run.metrics_file, line=2)  # the first episode's second learner
+    resume(run.path, OFF, SILENT)
+    assert "metrics.csv: its damaged rows are lost" in capsys.readouterr().err
+    left, whole = run.metrics(), RunDirectory(unbroken).metrics()
+    assert left.drop(columns="seconds").equals(
+        whole.drop(index=1).drop(columns="seconds").reset_index(drop=True)
+    )
+
+
+def test_without_a_whole_checkpoint_nothing_is_touched(run: RunDirectory) -> None:
+    cut(run.last_checkpoint, 0.5)
+    cut(run.previous_checkpoint, 0.9)
+    before = run.metrics_file.read_bytes()
+    with pytest.raises(InputError, match=r"checkpoint = .*last\.pt.*: expected a checkpoint"):
+        resume(run.path, OFF, SILENT)
+    assert run.metrics_file.read_bytes() == before
+
+
+def test_a_full_disk_halts_a_training_which_goes_on_when_there_is_room(
+    unbroken: Path, tmp_path: Path
+) -> None:
+    with small_disk(tmp_path / "disk") as disk:
+        run = interrupt(disk.path / "run")
+        line = r"^halted after episode 4 of 6: [^\n]*: (No space|File too large)[^\n]*is kept$"
+        with disk.full(), pytest.raises(Halted, match=line) as halted:
+            resume(run.path, OFF, SILENT)
+        assert halted.value.resumable
+        resume(run.path, OFF, SILENT)
+        assert differences(outcome(run.path), outcome(unbroken)) == []
+
+
+def test_a_read_only_directory_is_refused_before_anything_is_done(tmp_path: Path) -> None:
+    with small_disk(tmp_path / "disk") as disk:
+        run = interrupt(disk.path / "run")
+        with disk.read_only():
+            for path in (run.path, disk.path / "another"):
+                with pytest.raises(InputError, match=r"run directory = .*: expected a writable"):
+                    train_or_resume(path, every_episode(6), OFF, SILENT)
+        assert RunDirectory(run.path).metrics()["episode"].max() == 3
+
+
+def test_two_processes_do_not_train_in_one_directory(run: RunDirectory) -> None:
+    with (
+        run.reserved(),
+        pytest.raises(InputError, match="expected one in which no other process trains"),
+    ):
+        resume(run.path, OFF, SILENT)
+
+
+def test_the_same_request_goes_on_and_another_is_refused(run: RunDirectory, unbroken: Path) -> None:
+    train_or_resume(run.path, every_episode(6), OFF, SILENT)
+    assert differences(outcome(run.path), outcome(unbroken)) == []
+    with pytest.raises(InputError, match="expected one without a run in it"):
+        train_or_resume(run.path, every_episode(7), OFF, SILENT)
+
+
+def test_a_learner_without_finite_numbers_stops_and_the_others_do_not_notice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], unbroken: Path
+) -> None:
+    """Its critic begins with weights so large that the square of its loss is beyond a float."""
+    configuration = every_episode(6)
+    weights = Training(
+        configuration.scenario,
+        configuration.learners,
+        configuration.algorithm,
+        configuration.training,
+    ).best_weights
+    for name, values in weights.items():
+        if "value_network" in name:
+            values.select(-min(values.ndim, 3), 1).mul_(1e25)
+    run = train(tmp_path / "run", configuration, OFF, SILENT, initial_weights=weights)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("learner 1 (relay_T8_seed3) stops in episode ")
+    metrics, whole = run.metrics(), RunDirectory(unbroken).metrics()
+    last = metrics.groupby("learner")["episode"].max().to_dict()
+    assert last[0] == last[2] == 6
+    assert f"stops in episode {last[1] + 1}, slots {8 * last[1] + 1} to {8 * last[1] + 8}" in line
+    for learner in (0, 2):
+        own, other = (rows[rows["learner"] == learner] for rows in (metrics, whole))
+        assert own["loss_critic"].tolist()[2:] == other["loss_critic"].tolist()[2:]
+    assert all(values.isfinite().all() for values in run.best_weights().values())
+
+
+def test_a_training_halts_when_no_learner_is_left(tmp_path: Path) -> None:
+    configuration = every_episode(6)
+    wild = dataclasses.replace(
+        configuration.algorithm,
+        actor_learning_rate=1.0,
+        critic_learning_rate=1.0,
+        reward_scale=1e30,
+    )
+    configuration = dataclasses.replace(configuration, algorithm=wild)
+    with pytest.raises(Halted, match=r"^halted after episode \d of 6: every learner has stopped$"):
+        train(tmp_path / "run", configuration, OFF, SILENT)
+    run = RunDirectory(tmp_path / "run")
+    assert all(values.isfinite().all() for values in run.best_weights().values())
+    accumulated = run.metrics()["loss_critic"].dropna()
+    assert all(math.isfinite(loss) for loss in accumulated)
+
+
+def test_the_first_signal_is_remembered_and_the_second_obeyed() -> None:
+    with Interruption() as interruption:
+        interruption.raise_if_requested("nothing yet")
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert interruption.requested
+        with pytest.raises(KeyboardInterrupt, match="so far") as stopped:
+            interruption.raise_if_requested("so far")
+        assert stopped.value.signal == signal.SIGTERM  # type: ignore[attr-defined]
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_a_signal_that_is_ignored_stays_so() -> None:
+    former = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with Interruption() as interruption:
+            signal.raise_signal(signal.SIGINT)
+            assert not interruption.requested
+    finally:
+        signal.signal(signal.SIGINT, former)
+
+
+def test_pytorchs_own_generator_is_not_drawn_from(run: RunDirectory) -> None:
+    """Which is why no checkpoint holds its state."""
+    configuration = run.configuration()
+    training = Training(
+        configuration.scenario,
+        configuration.learners,
+        configuration.algorithm,
+        configuration.training,
+    )
+    before = torch.get_rng_state()
+    list(training.episodes())
+    assert torch.equal(torch.get_rng_state(), before)
