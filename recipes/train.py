@@ -73,7 +73,8 @@ def main(config: Config, directory: Path) -> None:
     ]
     configuration = RunConfiguration.from_dict({**config, "learners": learners})
     weights = None if options.warm_start is None else saved_weights(options.warm_start)
-    with telling_how_to_go_on(override("resume", directory)):
+    begun = RunDirectory(directory)
+    with telling_how_to_go_on(override("resume", directory), possible=lambda: begun.exists):
         run = train(
             directory,
             configuration,

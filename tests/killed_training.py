@@ -26,7 +26,7 @@ PROCESSES = multiprocessing.get_context("forkserver")
 PROCESSES.set_forkserver_preload(["killed_training"])
 
 
-def small(compile_slots: str, num_episodes: int = 16) -> RunConfiguration:
+def small(compile_slots: str, num_episodes: int = 12) -> RunConfiguration:
     """With a warm-up, two horizons on two threads, repeated flights, restarts and checkpoints."""
     return RunConfiguration(
         "two_clusters",
@@ -34,7 +34,7 @@ def small(compile_slots: str, num_episodes: int = 16) -> RunConfiguration:
         (Learner("hybrid", 3), Learner("relay", 3, 8), Learner("jamming", 4)),
         "ddpg_robust",
         RobustDDPG(
-            hidden_sizes=(16,), warm_up_episodes=3, restart_after=12, actor_learning_rate=3e-3
+            hidden_sizes=(16,), warm_up_episodes=3, restart_after=9, actor_learning_rate=3e-3
         ),
         TrainingParameters(
             num_episodes=num_episodes,

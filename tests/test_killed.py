@@ -2,14 +2,22 @@
 
 import json
 import random
+import statistics
 import time
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from hyuav import Scenario
+from hyuav.learning.algorithms import DDPG
 from hyuav.learning.checkpoint import load_checkpoint
+from hyuav.learning.cohort import Learner
+from hyuav.learning.training import Training, TrainingParameters
 from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.tracking.checkpoints import Reported, save_checkpoints
 from killed_training import differences, outcome, process, small
 
 MEASURED = Path("runs/reliability")
@@ -34,6 +42,12 @@ def kill_after(seconds: float, directory: Path, configuration: RunConfiguration)
     running.kill()
     running.join()
     return running.exitcode != 0
+
+
+def write_figures(name: str, figures: Mapping[str, Any]) -> None:
+    """Keep what docs/reliability.md tells."""
+    MEASURED.mkdir(parents=True, exist_ok=True)
+    (MEASURED / f"{name}.json").write_text(f"{json.dumps(figures, indent=2)}\n")
 
 
 def stage(directory: Path) -> str:
@@ -78,9 +92,7 @@ def test_a_killed_training_ends_with_the_numbers_of_an_unbroken_one(
         "numbers and rows compared each time": len(expected),
         "stages": dict(stages),
     }
-    MEASURED.mkdir(parents=True, exist_ok=True)
-    file = MEASURED / f"kills_compile_{compiled}.json"
-    file.write_text(f"{json.dumps(figures, indent=2)}\n")
+    write_figures(f"kills_compile_{compiled}", figures)
 
 
 @pytest.mark.slow
@@ -92,3 +104,30 @@ def test_a_training_that_is_killed_again_and_again_ends_so_too(tmp_path: Path) -
         killed += 1
     assert killed > 0
     assert differences(outcome(tmp_path / "killed"), outcome(tmp_path / "unbroken")) == []
+
+
+@pytest.mark.slow
+def test_a_checkpoint_takes_some_megabytes_for_each_learner(tmp_path: Path) -> None:
+    """At the paper's sizes; how long it takes is written down, too."""
+    learners = 10
+    training = Training(
+        Scenario.preset("two_clusters"),
+        [Learner(seed=seed) for seed in range(learners)],
+        DDPG(),
+        TrainingParameters(num_episodes=1, batch_size=8, evaluation_episodes=1, compile="never"),
+    )
+    list(training.episodes())
+    run, seconds = RunDirectory(tmp_path), []
+    for _ in range(9):
+        started = time.perf_counter()
+        save_checkpoints(run, training, Reported())
+        seconds.append(time.perf_counter() - started)
+    megabytes = {
+        file.name: round(file.stat().st_size / 1e6, 1)
+        for file in (run.last_checkpoint, run.best_checkpoint)
+    }
+    write_figures(
+        "checkpoint",
+        {"learners": learners, "megabytes": megabytes, "seconds": statistics.median(seconds)},
+    )
+    assert megabytes["last.pt"] < 6 * learners

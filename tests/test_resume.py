@@ -19,6 +19,7 @@ from hyuav.experiment import resume, train, train_or_resume
 from hyuav.interruption import Interruption
 from hyuav.learning.training import Training
 from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.tracking.checkpoints import first_checkpoint
 from killed_training import OFF, differences, outcome, small
 
 SILENT = Console(file=io.StringIO())
@@ -72,6 +73,21 @@ def test_going_on_ends_with_the_numbers_of_an_unbroken_training(
     resume(run.path, OFF, SILENT)
     assert differences(outcome(run.path), outcome(unbroken)) == []
     assert capsys.readouterr().err == ""
+
+
+def test_a_training_that_only_began_goes_on_from_its_initial_weights(
+    tmp_path: Path, unbroken: Path
+) -> None:
+    configuration = every_episode(6)
+    start = Training(
+        configuration.scenario,
+        configuration.learners,
+        configuration.algorithm,
+        configuration.training,
+    )
+    run = RunDirectory.create(tmp_path / "run", configuration, None, first_checkpoint(start))
+    resume(run.path, OFF, SILENT)
+    assert differences(outcome(run.path), outcome(unbroken)) == []
 
 
 @pytest.mark.parametrize("fault", ["cut", "missing", "metrics cut", "metrics spoilt"])

@@ -146,11 +146,14 @@ def given() -> set[str]:
 
 
 @contextmanager
-def telling_how_to_go_on(*overrides: str) -> Iterator[None]:
+def telling_how_to_go_on(
+    *overrides: str, possible: Callable[[], bool] = lambda: True
+) -> Iterator[None]:
     """Let whoever interrupts what is done inside know the command that goes on with it.
 
     Args:
         overrides: with which to call the same recipe.
+        possible: whether anything has begun with which to go on.
 
     Raises:
         Interrupted: in place of any other interruption, with the command.
@@ -160,6 +163,8 @@ def telling_how_to_go_on(*overrides: str) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt as error:
+        if not possible():
+            raise
         number = error.signal if isinstance(error, Interrupted) else signal.SIGINT
         raise Interrupted(f"{str(error) or 'interrupted'}; {hint}", number) from None
     except Halted as error:
