@@ -125,7 +125,7 @@ def test_without_a_whole_checkpoint_nothing_is_touched(run: RunDirectory) -> Non
     cut(run.last_checkpoint, 0.5)
     cut(run.previous_checkpoint, 0.9)
     before = run.metrics_file.read_bytes()
-    with pytest.raises(InputError, match=r"checkpoint = .*last\.pt.*: expected a checkpoint"):
+    with pytest.raises(InputError, match=r"^last\.pt: checkpoint = .*: expected a checkpoint"):
         resume(run.path, OFF, SILENT)
     assert run.metrics_file.read_bytes() == before
 

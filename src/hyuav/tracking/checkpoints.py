@@ -67,7 +67,7 @@ def restore(run: RunDirectory, training: Training) -> Reported:
         try:
             found = _read(file)
         except InputError as error:
-            reasons.append(str(error))
+            reasons.append(f"{file.name}: {error}")
             continue
         whole.append(found)
         if found.reported.metrics.is_in(run.metrics_file):
