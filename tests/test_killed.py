@@ -80,7 +80,7 @@ def test_a_killed_training_ends_with_the_numbers_of_an_unbroken_one(
         directory = tmp_path / f"killed-{number}"
         moment = (number + luck.random()) / kills * lifetime
         while not kill_after(moment, directory, configuration):
-            moment, directory = 0.9 * moment, directory.with_name(f"{directory.name}-again")
+            moment, directory = 0.6 * moment, directory.with_name(f"{directory.name}-again")
         stages[stage(directory)] += 1
         torn += any(directory.rglob("*.partial"))
         run_to_the_end(directory, configuration)
