@@ -4,6 +4,7 @@ python recipes/compare.py
 python recipes/compare.py algorithm=[ddpg,td3] scenario=two_clusters learners=5
 python recipes/compare.py scenario=[] layouts=50 learners=1
 python recipes/compare.py output=runs/NAME
+python recipes/compare.py learners=1000 engine=ray address=auto
 """
 
 import sys
@@ -39,7 +40,7 @@ from hyuav.tracking import LoggerParameters, log_comparison
 def main(config: Config, directory: Path) -> None:
     """Train what is missing, print the tables, draw the figures."""
     options = section(config, Compare)
-    require_libraries(options.algorithm)
+    require_libraries(options)
     torch.set_num_threads(1)
     comparison = ComparisonDirectory(directory, config, options)
     console = Console()

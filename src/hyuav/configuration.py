@@ -18,6 +18,7 @@ import hydra
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
+from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -25,6 +26,9 @@ from hyuav.errors import Halted, InputError, Interrupted, require_choice
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.parameters import Parameters, refuse_unknown
 from hyuav.scenario import PRESETS, Scenario
+
+NOW = "${now:%Y-%m-%d_%H-%M-%S}"
+"""In the pattern of a run's directory, when the command was called."""
 
 Config = dict[str, Any]
 """A composed configuration in plain values."""
@@ -68,14 +72,19 @@ def recipe(
         options: the typed defaults at the top of the configuration.
         groups: Hydra's groups and the member chosen by default.
         sections: what makes the typed defaults of the configuration's other sections.
-        run_directory: pattern of the directory in which a run keeps its files.
+        run_directory: pattern of the directory in which a run keeps its files. Those of a multirun
+            stand together in one directory, by their numbers.
     """
     store = ConfigStore.instance()
     node: dict[str, Any] = options().to_dict()
     node |= {section: parameters().to_dict() for section, parameters in sections.items()}
+    sweep, _, own = run_directory.partition(f"{NOW}_")
     node["hydra"] = {
         "run": {"dir": run_directory},
-        "sweep": {"dir": run_directory, "subdir": "${hydra.job.num}"},
+        "sweep": {
+            "dir": f"{sweep}{NOW}_sweep" if own else run_directory,
+            "subdir": f"${{hydra.job.num}}_{own}" if own else "${hydra.job.num}",
+        },
         "output_subdir": None,
     }
     node["defaults"] = [
@@ -97,6 +106,8 @@ def recipe(
                 function(_plain(config, groups), directory)
             except InputError as error:
                 _remove_if_empty(directory)
+                if HydraConfig.get().mode is RunMode.MULTIRUN:
+                    raise  # the other jobs go on, and Hydra says which one it was
                 _refuse(str(error))  # here, before Hydra adds lines of its own
 
         # Or Hydra would take this package's folders for groups: hyuav/figures for ``figures=...``.
@@ -111,7 +122,7 @@ def recipe(
                 with one_line:
                     hydra.main(version_base=None, config_path=None, config_name=name)(run)()
             except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
-                if composed:
+                if composed and not isinstance(error, InputError):
                     raise
                 _refuse(explain(error))
             except KeyboardInterrupt as error:

@@ -21,15 +21,17 @@ from hyuav.comparison.statistics import (
 from hyuav.configuration import Config
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EvaluationParameters
-from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import read_yaml
 from hyuav.runs import RunConfiguration, require_writable
 from hyuav.schemes.optimum import require_resolution
 from hyuav.tracking import LoggerParameters
 
-WORKING = ("workers", "output", "logger", "training.cohorts")
+WORKING = ("workers", "engine", "address", "retries", "output", "logger", "training.cohorts")
 """Entries of the configuration that change how the work is done and not what comes of it."""
+
+UNSAID = {"shard_learners": Compare.shard_learners}
+"""Entries that older comparisons do not name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,7 +87,7 @@ class ComparisonDirectory:
         for scenario in scenarios.values():
             resolution, longest = self._evaluation.resolution, max(options.num_slots)
             require_resolution(resolution, scenario.map_side, longest)
-        if options.workers > 1:
+        if options.workers > 1 or options.engine == "ray":
             self._training = dataclasses.replace(self._training, cohorts=1)
         self._begin(config)
         self.optima = {
@@ -98,10 +100,11 @@ class ComparisonDirectory:
             for name, scenario in scenarios.items()
         }
         self.shards = [
-            self._shard(entry, name, num_slots)
+            self._shard(entry, name, num_slots, part)
             for entry in options.entries
             for name in self.optima
             for num_slots in options.num_slots
+            for part in options.parts()
         ]
 
     def _begin(self, config: Config) -> None:
@@ -114,7 +117,7 @@ class ComparisonDirectory:
             file.write_text(OmegaConf.to_yaml(request), encoding="utf-8")
             return
         try:
-            asked, kept = _entries(request), _entries(read_yaml(file))
+            asked, kept = _entries(request), _entries(UNSAID | read_yaml(file))
         except InputError as error:
             accepted = f"a comparison's directory (config.yaml: {error})"
             raise InputError(rejection("output", str(self.path), accepted)) from None
@@ -125,16 +128,12 @@ class ComparisonDirectory:
                 )
                 raise InputError(rejection("output", str(self.path), accepted))
 
-    def _shard(self, entry: str, name: str, num_slots: int) -> Shard:
-        options = self.options
+    def _shard(self, entry: str, name: str, num_slots: int, part: range) -> Shard:
+        learners = self.options.members
         configuration = RunConfiguration(
             name,
             dataclasses.replace(self.optima[name].scenario, num_slots=num_slots),
-            tuple(
-                Learner(scheme, seed)
-                for scheme in options.scheme
-                for seed in range(options.seed, options.seed + options.learners)
-            ),
+            learners[part.start : part.stop],
             entry.partition("-")[0],
             parameters_of(entry),
             self._training,
@@ -143,10 +142,11 @@ class ComparisonDirectory:
             entry,
             configuration,
             self._evaluation,
-            options.threshold,
+            self.options.threshold,
             self._logger,
             self.optima[name],
             self.path / "shards",
+            "" if len(part) == len(learners) else f"_{part.start}-{part.stop - 1}",
         )
 
     def summary(self) -> Summary | None:

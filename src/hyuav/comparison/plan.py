@@ -1,14 +1,17 @@
 """What a comparison covers: algorithms, scenarios, schemes, horizons and seeds."""
 
 import dataclasses
-from collections.abc import Iterable
+import itertools
+import math
 from dataclasses import dataclass
 
 from hyuav.benchmark.plan import require_peers
+from hyuav.cluster import LOCAL, require_ray
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EvaluationParameters
 from hyuav.layouts import random_layout
 from hyuav.learning.algorithms import ALGORITHMS, DDPG, AlgorithmParameters
+from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import (
     Converter,
@@ -42,6 +45,9 @@ PIECES = tuple(
     )
 )
 """Hyperparameters in which a variant differs from the algorithm that it is a variant of."""
+
+ENGINES = ("processes", "ray")
+"""What works the shards off."""
 
 LAYOUT = "layout-"
 """With its seed behind, the name of a random layout's scenario."""
@@ -79,9 +85,17 @@ class Compare(Parameters):
     seed: int = parameter(count(0), 0)
     threshold: float = parameter(number(0.0, 1.0), 0.97)
     """Share of the optimum that counts as solved."""
+    shard_learners: int = parameter(count(), 60)
+    """The most learners that one worker trains side by side: about 0.7 GB of them (U = 10)."""
+    engine: str = parameter(choice(*ENGINES), "processes")
+    """What the workers are: processes of this machine, or those of Ray (extra ``cluster``)."""
+    address: str = parameter(text, LOCAL)
+    """Of Ray: one that is started for the work, "auto" for one that runs here, or HOST:PORT."""
     workers: int = parameter(count(), cores())
-    """Processes that train at the same time; with one, it is this process. By default as many
-    as cores."""
+    """That train at the same time, by default as many as cores; one process is this one. A Ray
+    that runs has its own."""
+    retries: int = parameter(count(0), 2)
+    """How often a piece of work is begun again whose worker was lost, killed perhaps."""
     output: str = parameter(text, "runs/${now:%Y-%m-%d_%H-%M-%S}_compare")
     """Directory of the comparison, which may have been begun."""
 
@@ -104,6 +118,19 @@ class Compare(Parameters):
             for entry in (name, *(f"{name}-{piece}" for piece in self.without))
             if entry == name or parameters_of(entry) != parameters_of(name)
         )
+
+    @property
+    def members(self) -> tuple[Learner, ...]:
+        """The learners of each algorithm, scenario and horizon."""
+        seeds = range(self.seed, self.seed + self.learners)
+        return tuple(Learner(scheme, seed) for scheme in self.scheme for seed in seeds)
+
+    def parts(self) -> list[range]:
+        """Places in :attr:`members`, in near-equal parts of at most ``shard_learners``."""
+        several = len(self.scheme) * self.learners
+        bounds = range(math.ceil(several / self.shard_learners) + 1)
+        ends = [place * several // bounds[-1] for place in bounds]
+        return [range(start, stop) for start, stop in itertools.pairwise(ends)]
 
     def scenarios(self) -> dict[str, Scenario]:
         """By name, the presets and then the random layouts."""
@@ -143,10 +170,12 @@ def training_episodes(training: TrainingParameters) -> EvaluationParameters:
     )
 
 
-def require_libraries(names: Iterable[str]) -> None:
-    """Accept entries whose libraries can be imported.
+def require_libraries(options: Compare) -> None:
+    """Accept entries and an engine whose libraries can be imported.
 
     Raises:
         InputError: naming those that cannot, and how to get them.
     """
-    require_peers(("training",), tuple(name for name in names if name == PEER))
+    require_peers(("training",), tuple(name for name in options.algorithm if name == PEER))
+    if options.engine == "ray":
+        require_ray()

@@ -12,9 +12,10 @@ from rich.console import Console
 
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.plan import PEER, training_episodes
+from hyuav.errors import InputError
 from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
-from hyuav.experiment import LEARNED, learned_policies, train
-from hyuav.runs import RunConfiguration
+from hyuav.experiment import LEARNED, learned_policies, resume, train
+from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.tracking import LoggerParameters, in_group
 
 RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
@@ -22,7 +23,7 @@ RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
 
 @dataclass(frozen=True)
 class Shard:
-    """All schemes and seeds of one algorithm, scenario and horizon, which train side by side.
+    """Learners of one algorithm, scenario and horizon, which one worker trains side by side.
 
     Its directory is a run directory with two tables more, :func:`tables`; that of
     Stable-Baselines3 holds the tables alone. It is there once all of it is written.
@@ -38,12 +39,14 @@ class Shard:
     optima: Optima
     parent: Path
     """Of the shard's directory."""
+    part: str = ""
+    """Behind its name, where the learners of the same are in several shards."""
 
     @property
     def name(self) -> str:
-        """Entry, scenario and horizon."""
+        """Entry, scenario, horizon and part."""
         scenario, horizon = self.configuration.scenario_name, self.configuration.scenario.num_slots
-        return f"{self.entry}_{scenario}_T{horizon}"
+        return f"{self.entry}_{scenario}_T{horizon}{self.part}"
 
     @property
     def path(self) -> Path:
@@ -56,29 +59,60 @@ class Shard:
         return (self.path / RESULTS_FILE).is_file()
 
     def run(self) -> None:
-        """Train, evaluate and keep everything; what a broken attempt left is removed."""
+        """Train, evaluate and keep everything; a broken attempt goes on from its checkpoint."""
         partial = self.path.with_name(f"{self.name}.partial")
-        if partial.exists():
-            shutil.rmtree(partial)
         if self.entry == PEER:
             from hyuav.comparison import stable_baselines  # needs a library that is optional
 
+            _clear(partial)
             partial.mkdir(parents=True)
             metrics, sum_rates = stable_baselines.train(self.configuration, self.evaluation)
         else:
-            metrics, sum_rates = _train(self, partial)
+            metrics, sum_rates = _reached(self, _go_on(self, partial) or _begin(self, partial))
         results, curves = tables(self, metrics, sum_rates)
         results.to_parquet(partial / RESULTS_FILE)
         curves.to_parquet(partial / CURVES_FILE)
         partial.rename(self.path)
 
 
-def _train(shard: Shard, directory: Path) -> tuple[pd.DataFrame, list[float]]:
-    """The evaluations of a training by this project, and the best actors' sum-rates in bps/Hz."""
-    configuration, scenario = shard.configuration, shard.configuration.scenario
+def _clear(directory: Path) -> None:
+    if directory.exists():
+        shutil.rmtree(directory)
+
+
+def _begin(shard: Shard, directory: Path) -> RunDirectory:
+    _clear(directory)
     logs = shard.parent.parent  # which does not change its name
-    logger = dataclasses.replace(in_group(shard.logger, logs), name=shard.name, id=None)
-    run = train(directory, configuration, logger, Console(quiet=True), logs=logs)
+    configuration = shard.configuration
+    return train(directory, configuration, _logger(shard), Console(quiet=True), logs=logs)
+
+
+def _go_on(shard: Shard, directory: Path) -> RunDirectory | None:
+    """The training that a broken attempt left, to its end; None where it is of no use."""
+    run = RunDirectory(directory)
+    try:
+        if _comparable(run.configuration()) != _comparable(shard.configuration):
+            return None
+        return resume(directory, _logger(shard), Console(quiet=True))
+    except InputError:  # no checkpoint yet, or one that cannot be read
+        return None
+
+
+def _comparable(configuration: RunConfiguration) -> RunConfiguration:
+    """The same whatever the number of cohorts, which changes speed alone."""
+    training = dataclasses.replace(configuration.training, cohorts=1)
+    return dataclasses.replace(configuration, training=training)
+
+
+def _logger(shard: Shard) -> LoggerParameters:
+    return dataclasses.replace(
+        in_group(shard.logger, shard.parent.parent), name=shard.name, id=None
+    )
+
+
+def _reached(shard: Shard, run: RunDirectory) -> tuple[pd.DataFrame, list[float]]:
+    """A training's evaluations, and the best actors' sum-rates in bps/Hz."""
+    configuration, scenario = shard.configuration, shard.configuration.scenario
     metrics = run.metrics().dropna(subset="evaluation")
     metrics["seconds"] /= len(configuration.learners)
     earned: dict[str, list[float]] = {

@@ -1,10 +1,13 @@
 """Doing what is left of a comparison, and telling how far it is."""
 
+from functools import partial
+
 from rich.console import Console
 
 from hyuav.comparison.directory import ComparisonDirectory
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.processes import Workers
+from hyuav.comparison.ray import RayWorkers
 from hyuav.comparison.shards import Shard
 from hyuav.terminal import make_progress
 
@@ -20,8 +23,10 @@ def work_off(comparison: ComparisonDirectory, console: Console) -> dict[str, str
         the reason for each failure, by what failed.
     """
     failures: dict[str, str] = {}
+    options = comparison.options
+    begin = Workers if options.engine == "processes" else partial(RayWorkers, options.address)
     progress = make_progress(console, "{task.description}")
-    with progress, Workers(comparison.options.workers) as workers:
+    with progress, begin(options.workers, options.retries) as workers:
         unsolved = [own for own in comparison.optima.values() if not own.file.exists()]
         task = progress.add_task("optima", total=len(unsolved))
         for optima, reason in workers.attempt_all(Optima.solve, unsolved):
@@ -36,4 +41,6 @@ def work_off(comparison: ComparisonDirectory, console: Console) -> dict[str, str
             progress.advance(task)
             if reason is not None:
                 failures[shard.name] = reason
+            elif not shard.is_finished:
+                failures[shard.name] = "its worker wrote it where it cannot be seen from here"
     return failures

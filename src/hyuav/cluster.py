@@ -1,0 +1,119 @@
+"""Ray: on this machine without any set-up, or a cluster by its address (the extra ``cluster``)."""
+
+import contextlib
+import importlib.util
+import os
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from hyuav.errors import InputError, rejection
+
+LOCAL = "local"
+"""The address of a Ray that is started for the work and ends with it."""
+
+OBJECT_STORE_BYTES = 100 * 2**20
+"""Of a Ray of our own. What passes between processes is small: results lie in files."""
+
+STARTS = 3
+"""How often a Ray of our own is started; on a busy machine the first may come up too late."""
+
+_ENVIRONMENT = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_COLOR_PREFIX": "0",
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # as will be Ray's default, of which it warns
+}
+
+_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
+"""By which Ray listens on the loopback alone, on every system; read when it is imported."""
+
+Piece = TypeVar("Piece")
+
+
+def require_ray() -> None:
+    """Accept the wish for Ray where it can be imported.
+
+    Raises:
+        InputError: naming the extra.
+    """
+    if importlib.util.find_spec("ray") is None:
+        raise InputError("ray cannot be imported: pip install 'hyuav[cluster]'")
+
+
+@contextlib.contextmanager
+def connected(address: str, workers: int, *, prints: bool) -> Iterator[None]:
+    """Be connected to Ray.
+
+    Args:
+        address: :data:`LOCAL`, "auto" for the one that runs on this machine, or HOST:PORT.
+        workers: of a local one, which work at the same time.
+        prints: whether what the workers print is printed here.
+
+    Raises:
+        InputError: Ray cannot be imported, or there is none at the address.
+    """
+    require_ray()
+    for name, value in (_ENVIRONMENT | (_LOOPBACK if address == LOCAL else {})).items():
+        os.environ.setdefault(name, value)
+    import ray  # reads the environment
+
+    options: dict[str, Any] = {"log_to_driver": prints, "logging_level": "CRITICAL"}
+    if address == LOCAL:
+        options |= {"num_cpus": workers, "include_dashboard": False}
+        options["object_store_memory"] = OBJECT_STORE_BYTES
+    try:
+        _connect(address, options)
+        yield
+    finally:
+        ray.shutdown()
+
+
+def _connect(address: str, options: dict[str, Any]) -> None:
+    import ray
+
+    for attempt in range(1, STARTS + 1):
+        try:
+            ray.init(address, **options)
+        except Exception as error:  # Ray has no class for it
+            ray.shutdown()
+            if address == LOCAL and attempt < STARTS:
+                continue
+            reason = " ".join(str(error).split())[:200]
+            accepted = f"{LOCAL}, auto or HOST:PORT of a Ray that runs ({reason})"
+            raise InputError(rejection("address", address, accepted)) from None
+        return
+
+
+def outcomes(
+    function: Callable[[Piece], Any], pieces: Sequence[Piece], *, retries: int
+) -> Iterator[tuple[Piece, Any]]:
+    """Do pieces of work on Ray's workers, one processor core each.
+
+    Args:
+        function: does a piece.
+        pieces: of work.
+        retries: how often a piece is begun again whose worker was lost.
+
+    Yields:
+        each piece when it is done, and what the function returned; the exception where it raised
+        one, and a ``ChildProcessError`` where the worker was lost for good.
+    """
+    import ray
+    from ray.exceptions import RayError, RayTaskError
+
+    task = ray.remote(num_cpus=1, max_retries=0)(function)
+    begun = {task.remote(piece): (piece, retries) for piece in pieces}
+    while begun:
+        (reference,), _ = ray.wait(list(begun))
+        piece, left = begun.pop(reference)
+        outcome: Any
+        try:
+            outcome = ray.get(reference)
+        except RayTaskError as error:
+            outcome = error.cause
+        except RayError:
+            if left:
+                begun[task.remote(piece)] = piece, left - 1
+                continue
+            times = f", {retries + 1} times" if retries else ""
+            outcome = ChildProcessError(f"its worker was lost{times}")
+        yield piece, outcome
