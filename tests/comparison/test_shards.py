@@ -1,10 +1,13 @@
 """A shard's tables, in which every learner stands beside the optimum in the same episodes."""
 
+import dataclasses
+import os
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 
 from hyuav import Scenario
 from hyuav.comparison.optima import Optima
@@ -17,7 +20,7 @@ from hyuav.learning.training import Training, TrainingParameters
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.schemes.learned import LearnedPolicy
 from hyuav.schemes.optimum import solve
-from hyuav.tracking import LoggerParameters
+from hyuav.tracking import LoggerParameters, Tracker
 
 TRAINING = TrainingParameters(
     num_episodes=5,
@@ -139,6 +142,43 @@ def test_a_shard_of_this_project_is_a_run(optima: Optima, tmp_path: Path) -> Non
     flights = fly(SCENARIO, "proposed", Policy(last), EVALUATION)
     expected = float(flights.totals["secrecy_sum_rate"].mean())
     assert results["sum_rate"].iloc[3] == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: Path) -> None:
+    whole, broken = shard(optima, tmp_path / "whole"), shard(optima, tmp_path / "broken")
+    whole.run()
+    run = RunDirectory.create(tmp_path / "broken/ddpg_campus_T6.partial", broken.configuration)
+    configuration = broken.configuration
+    training = Training(SCENARIO, LEARNERS, configuration.algorithm, TRAINING)
+    with Tracker(run, configuration, training, broken.logger, Console(quiet=True)) as tracker:
+        for episode in training.episodes():
+            tracker.log(episode)
+            if episode.number == 3:  # one after the last evaluation, and so the checkpoint
+                break
+    os.utime(run.config_file, (1.0, 1.0))
+    broken.run()
+    assert (broken.path / "config.yaml").stat().st_mtime == 1.0  # not begun again
+    for name in ("results.parquet", "curves.parquet"):
+        kept, expected = (pd.read_parquet(own.path / name) for own in (broken, whole))
+        clock = [column for column in kept.columns if column.startswith("seconds")]
+        pd.testing.assert_frame_equal(
+            kept.drop(columns=clock), expected.drop(columns=clock), check_exact=True
+        )
+
+
+@pytest.mark.parametrize("left", ["another", "nothing", "damaged"])
+def test_an_attempt_of_no_use_is_begun_again(optima: Optima, tmp_path: Path, left: str) -> None:
+    work = shard(optima, tmp_path)
+    configuration = work.configuration
+    if left == "another":
+        configuration = dataclasses.replace(configuration, learners=LEARNERS[:2])
+    run = RunDirectory.create(tmp_path / f"{work.name}.partial", configuration)
+    if left == "damaged":
+        run.last_checkpoint.parent.mkdir()
+        run.last_checkpoint.write_bytes(b"PK")
+    work.run()
+    assert len(pd.read_parquet(work.path / "results.parquet")) == 4
+    assert RunDirectory(work.path).configuration() == work.configuration
 
 
 def test_an_evaluation_in_training_needs_two_episodes() -> None:

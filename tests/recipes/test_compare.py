@@ -1,6 +1,7 @@
 """The comparison's recipe as a user calls it, at a size that is small enough for a test."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -160,6 +161,9 @@ REFUSALS = [
     (["scheme=both"], "scheme = 'both': expected one of hybrid, relay, jamming"),
     (["num_slots=[10,0]"], "num_slots[1] = 0: expected a whole number >= 1"),
     (["learners=0"], "learners = 0: expected a whole number >= 1"),
+    (["shard_learners=0"], "shard_learners = 0: expected a whole number >= 1"),
+    (["engine=slurm"], "engine = 'slurm': expected one of processes, ray"),
+    (["retries=-1"], "retries = -1: expected a whole number >= 0"),
     (["workers=0"], "workers = 0: expected a whole number >= 1"),
     (["threshold=97"], "threshold = 97: expected a number in [0, 1]"),
     (["treshold=1"], "configuration: unknown field 'treshold': did you mean 'threshold'"),
@@ -184,3 +188,36 @@ def test_a_missing_library_is_named_with_the_way_to_get_it(
     monkeypatch.setattr(plan, "_can_be_found", lambda _: False)
     line = "error: stable_baselines3 cannot be imported: pip install 'hyuav[bench]'\n"
     assert refusal("compare", "algorithm=[ddpg,stable_baselines3]", *TINY_COMPARISON) == line
+
+
+def test_ray_is_asked_for_with_its_extra(refusal: Refusal, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    line = "error: ray cannot be imported: pip install 'hyuav[cluster]'\n"
+    assert refusal("compare", "engine=ray", *TINY_COMPARISON) == line
+
+
+def test_an_older_comparison_is_taken_up_and_its_shards_may_not_be_cut_anew(
+    call: Call, refusal: Refusal, tmp_path: Path
+) -> None:
+    one = [*TINY_COMPARISON, "algorithm=ddpg", "scenario=two_clusters", "scheme=[hybrid,relay]"]
+    call("compare", *one)
+    config = tmp_path / "here" / "config.yaml"
+    lines = config.read_text().splitlines(keepends=True)
+    added = ("shard_learners:", "engine:", "address:", "retries:")
+    config.write_text("".join(line for line in lines if not line.startswith(added)))
+    shards = {path.name for path in (tmp_path / "here" / "shards").iterdir()}
+    call("compare", *one, "retries=0")
+    assert {path.name for path in (tmp_path / "here" / "shards").iterdir()} == shards
+    line = "expected a comparison with shard_learners = 3 (there it is 60)"
+    assert line in refusal("compare", *one, "shard_learners=3")
+
+
+def test_learners_that_do_not_fit_one_worker_are_shared(call: Call, tmp_path: Path) -> None:
+    one = [*TINY_COMPARISON, "algorithm=ddpg", "scenario=two_clusters", "scheme=[hybrid,relay]"]
+    call("compare", *one, "shard_learners=3")
+    here = tmp_path / "here"
+    names = {f"ddpg_two_clusters_T8_{part}" for part in ("0-1", "2-3")}
+    assert {path.name for path in (here / "shards").iterdir()} == names
+    results = pd.read_parquet(here / "results.parquet")
+    found = list(zip(results["scheme"], results["seed"], strict=True))
+    assert found == [(scheme, seed) for scheme in ("hybrid", "relay") for seed in (0, 1)]

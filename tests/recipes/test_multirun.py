@@ -1,0 +1,91 @@
+"""Multiruns of a recipe: on this machine, by submitit, and on a Ray."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from hyuav.runs import RunDirectory
+
+RECIPES = Path(__file__).parents[2] / "recipes"
+Call = Callable[..., None]
+
+TINY = [
+    "training.num_episodes=2",
+    "training.batch_size=8",
+    "training.evaluation_every=2",
+    "training.evaluation_episodes=3",
+    "training.compile=never",
+    "algorithm.hidden_sizes=[8]",
+    "scenario.num_slots=6",
+    "logger.mode=disabled",
+]
+NAMES = [
+    "0_two_clusters_ddpg_0",
+    "1_two_clusters_td3_0",
+    "2_two_clusters_ddpg_1",
+    "3_two_clusters_td3_1",
+]
+
+
+def runs(directory: Path) -> list[Path]:
+    (sweep,) = (directory / "runs").iterdir()
+    assert sweep.name.endswith("_sweep")
+    return sorted(path.parent for path in sweep.glob("*/config.yaml"))
+
+
+def test_a_multirun_keeps_a_run_for_every_job(call: Call, tmp_path: Path) -> None:
+    call("train", "-m", "seed=0,1", "algorithm=ddpg,td3", *TINY)
+    found = runs(tmp_path)
+    assert [run.name for run in found] == NAMES
+    configurations = [RunDirectory(run).configuration() for run in found]
+    assert [own.algorithm_name for own in configurations] == ["ddpg", "td3"] * 2
+    assert [own.learners[0].seed for own in configurations] == [0, 0, 1, 1]
+
+
+def test_a_job_with_a_mistake_is_named_and_stops_no_other(
+    call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        call("train", "-m", "scheme=both,hybrid", *TINY)
+    assert stopped.value.code == 2
+    job, line = capsys.readouterr().err.splitlines()
+    assert "scheme=both" in job
+    assert line == "error: scheme = 'both': expected one of hybrid, relay, jamming"
+    assert [run.name for run in runs(tmp_path)] == ["1_two_clusters_ddpg_0"]
+
+
+def test_the_launcher_of_ray_is_asked_for_with_its_extra(
+    call: Call, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(SystemExit) as stopped:
+        call("train", "-m", "seed=0,1", "hydra/launcher=ray", *TINY)
+    assert stopped.value.code == 2
+    assert (
+        capsys.readouterr().err == "error: ray cannot be imported: pip install 'hyuav[cluster]'\n"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("library", "launcher"),
+    [("ray", "ray"), ("hydra_plugins.hydra_submitit_launcher", "submitit_local")],
+)
+def test_a_launcher_trains_the_same(tmp_path: Path, library: str, launcher: str) -> None:
+    pytest.importorskip(library)
+    for name, arguments in {"here": [], "there": [f"hydra/launcher={launcher}"]}.items():
+        (tmp_path / name).mkdir()
+        command = [sys.executable, str(RECIPES / "train.py"), "-m", "seed=0,1"]
+        command += ["algorithm=ddpg,td3", *TINY, *arguments]
+        subprocess.run(command, cwd=tmp_path / name, check=True, timeout=1200)
+    here, there = runs(tmp_path / "here"), runs(tmp_path / "there")
+    assert [run.name for run in there] == [run.name for run in here] == NAMES
+    for one, other in zip(here, there, strict=True):
+        expected, found = (RunDirectory(run).metrics() for run in (one, other))
+        pd.testing.assert_frame_equal(
+            found.drop(columns="seconds"), expected.drop(columns="seconds"), check_exact=True
+        )
