@@ -34,6 +34,7 @@ SHARED = {
         "hyuav.metrics_file",
         "hyuav.durable",
         "hyuav.interruption",
+        "hyuav.cluster",
         "hyuav.configuration",
         "hyuav.terminal",
     ),
