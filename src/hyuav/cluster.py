@@ -100,7 +100,10 @@ def outcomes(
     import ray
     from ray.exceptions import RayError, RayTaskError
 
-    task = ray.remote(num_cpus=1, max_retries=0)(function)
+    def work(piece: Piece) -> Any:  # Ray takes no method and no partial
+        return function(piece)
+
+    task = ray.remote(num_cpus=1, max_retries=0)(work)
     begun = {task.remote(piece): (piece, retries) for piece in pieces}
     while begun:
         (reference,), _ = ray.wait(list(begun))
