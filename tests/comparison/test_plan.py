@@ -15,4 +15,4 @@ def test_learners_are_divided_into_near_equal_shards_that_fit_a_worker() -> None
 
 def test_few_learners_are_one_shard() -> None:
     assert Compare(learners=20).parts() == [range(60)]
-    assert Compare(learners=1, scheme="hybrid").parts() == [range(1)]
+    assert Compare(learners=1, scheme=("hybrid",)).parts() == [range(1)]
