@@ -41,12 +41,18 @@ class Halted(Exception):  # noqa: N818 - nothing was wrong with what was asked f
         self.resumable = resumable
 
 
+def brief(value: object) -> str:
+    """A value on one line, shortened, without characters that a terminal would obey."""
+    try:
+        shown = " ".join(repr(value).split())
+    except (ValueError, RecursionError):  # a whole number of thousands of digits, or no end
+        shown = f"a {type(value).__name__} too large to show"
+    return shown if len(shown) <= 80 else f"{shown[:77]}..."
+
+
 def rejection(name: str, value: object, accepted: str) -> str:
     """The one line that answers bad input: field, value (shortened), what is accepted."""
-    shown = " ".join(repr(value).split())
-    if len(shown) > 80:
-        shown = f"{shown[:77]}..."
-    return f"{name} = {shown}: expected {accepted}"
+    return f"{name} = {brief(value)}: expected {accepted}"
 
 
 def require_choice(name: str, value: object, choices: Iterable[str]) -> None:
@@ -58,6 +64,6 @@ def require_choice(name: str, value: object, choices: Iterable[str]) -> None:
     choices = list(choices)
     if isinstance(value, str) and value in choices:
         return
-    similar = difflib.get_close_matches(str(value), choices, n=1)
+    similar = difflib.get_close_matches(value, choices, n=1) if isinstance(value, str) else []
     hint = f" (did you mean {similar[0]!r}?)" if similar else ""
     raise InputError(rejection(name, value, f"one of {', '.join(choices)}") + hint)

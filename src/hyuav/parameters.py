@@ -5,15 +5,26 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import yaml
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from hyuav.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav.errors import InputError, InputTypeError, brief, rejection, require_choice
+
+YAML_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""Knows plain values alone; deep nesting would crash the fast one, were it not looked for first."""
+
+LARGEST_YAML = 2**22
+"""Bytes of a file that is read; the positions of a hundred thousand UEs take fewer."""
+
+DEEPEST_YAML = 20
+"""Lists and mappings within each other; configurations have five."""
 
 Converter = Callable[[str, Any], Any]
 """Takes a field's name and a value; returns the value as it is kept, or raises InputError."""
@@ -50,8 +61,8 @@ def number(
     return convert
 
 
-def count(low: int = 1) -> Converter:
-    """Accept whole numbers that are at least ``low``."""
+def count(low: int = 1, high: int = 2**63 - 1) -> Converter:
+    """Accept whole numbers in [low, high]; the highest possible is what an int64 holds."""
     accepted = f"a whole number >= {low}"
 
     def convert(name: str, value: Any) -> int:
@@ -63,6 +74,8 @@ def count(low: int = 1) -> Converter:
             raise InputTypeError(rejection(name, value, accepted)) from None
         if result < low:
             raise InputError(rejection(name, value, accepted))
+        if result > high:
+            raise InputError(rejection(name, value, f"a whole number <= {high}"))
         return result
 
     return convert
@@ -129,10 +142,10 @@ def sequence(element: Converter, accepted: str, *, length: int | None = None) ->
     return convert
 
 
-def increasing_pair(low: float) -> Converter:
-    """Accept two numbers (first, last) with low <= first <= last."""
+def increasing_pair(low: float, high: float = math.inf) -> Converter:
+    """Accept two numbers (first, last) with low <= first <= last <= high."""
     accepted = f"two numbers (low, high) with {low:g} <= low <= high"
-    pair = sequence(number(low), accepted, length=2)
+    pair = sequence(number(low, high), accepted, length=2)
 
     def convert(name: str, value: Any) -> tuple[float, float]:
         first, last = pair(name, value)
@@ -160,9 +173,37 @@ def refuse_unknown(owner: str, names: Iterable[str], known: Iterable[str]) -> No
     known = list(known)
     for name in names:
         if name not in known:
-            similar = difflib.get_close_matches(str(name), known, n=1)
+            similar = difflib.get_close_matches(str(name)[:80], known, n=1)
             hint = f"did you mean {similar[0]!r}?" if similar else f"one of {', '.join(known)}"
-            raise InputError(f"{owner}: unknown field {name!r}: {hint}")
+            raise InputError(f"{owner}: unknown field {brief(name)}: {hint}")
+
+
+def require_plain_yaml(path: Path) -> str:
+    """The text of a YAML file whose content is no larger and no deeper than it looks.
+
+    An alias could make a few lines into gigabytes, and brackets in brackets could exhaust the
+    stack of a parser.
+
+    Raises:
+        InputError: it is no file, too large, too deep, or has aliases; the message is the reason.
+        OSError: it cannot be read.
+        YAMLError: it is not YAML.
+    """
+    if path.exists() and not path.is_file():
+        raise InputError("cannot be read (not a file)")
+    with path.open("rb") as file:
+        content = file.read(LARGEST_YAML + 1)
+    if len(content) > LARGEST_YAML:
+        raise InputError(f"cannot be read (larger than {LARGEST_YAML} bytes)")
+    text, depth = content.decode("utf-8"), 0
+    for event in yaml.parse(text, YAML_LOADER):
+        if isinstance(event, yaml.AliasEvent):
+            raise InputError("cannot be read (it has aliases)")
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST_YAML:
+            raise InputError(f"cannot be read (nested more than {DEEPEST_YAML} times)")
+    return text
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:
@@ -172,9 +213,12 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
         InputError: no such file, not YAML, or not names with values; the message is the reason.
     """
     try:
-        values = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
+        content = require_plain_yaml(Path(path))
+        values = OmegaConf.to_container(OmegaConf.load(StringIO(content)), resolve=False)
     except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
+        if isinstance(error, InputError):
+            raise
+        reason = " ".join(str(error).split())[:200]
         raise InputError(f"cannot be read ({reason})") from None
     if not isinstance(values, dict):
         raise InputError("expected fields with values")

@@ -15,6 +15,9 @@ from hyuav.parameters import (
     switch,
 )
 
+LARGEST_LOAD = 1e30
+"""Of the energy in J and the power in W to compute all UEs' largest tasks."""
+
 Point = tuple[float, float]
 """Horizontal coordinates (x, y) in metres."""
 
@@ -30,9 +33,13 @@ PRESETS: dict[str, tuple[Point, ...]] = {
 }
 """UE positions in metres of the two layouts that reproduce the paper's figures 3a and 3b."""
 
-_non_negative, _positive, _range = number(0.0), number(above=0.0), increasing_pair(0.0)
-_power, _gain, _noise = number(0.0, 1e6), number(0.0, 1e8), number(1e-24, 1e6)  # within float32
+# Wider than any real value, and narrow enough for all that follows from them to be in float32.
+_length, _radius, _flown = number(1e-6, 1e9), number(0.0, 1e9), number(1e-9, 1e9)
+_power, _gain, _noise = number(0.0, 1e6), number(0.0, 1e6), number(1e-24, 1e6)
+_rate, _budget, _capacitance = number(0.0, 1e9), number(0.0, 1e30), number(0.0, 1.0)
+_range = increasing_pair(0.0, 1e12)
 _decibel = number(-100.0, 100.0)
+_slots = count(1, 10**6)
 _point = sequence(number(), "two coordinates (x, y) in metres", length=2)
 _points = sequence(_point, "at least one pair of coordinates (x, y) in metres")
 
@@ -59,16 +66,16 @@ class Scenario(Parameters):
     legitimate_position: Point = parameter(_point, (0.0, 0.0), symbol="(x_L, y_L)", unit="m")
     eavesdropper_position: Point = parameter(_point, (80.0, 80.0), symbol="(x_E, y_E)", unit="m")
     helper_start: Point = parameter(_point, (-60.0, -60.0), symbol="(x_H(0), y_H(0))", unit="m")
-    num_slots: int = parameter(count(), 20, symbol="T")
-    slot_duration: float = parameter(_positive, 1.0, symbol="Delta", unit="s")
-    map_side: float = parameter(_positive, 200.0, symbol="l_max", unit="m")
-    altitude: float = parameter(_positive, 80.0, symbol="h", unit="m")
-    eavesdropper_altitude: float = parameter(_positive, 120.0, symbol="h_e", unit="m")
-    coverage_radius: float = parameter(_non_negative, 45.0, symbol="D_max", unit="m")
-    max_speed: float = parameter(_positive, 20.0, symbol="v_max", unit="m/s")
+    num_slots: int = parameter(_slots, 20, symbol="T")
+    slot_duration: float = parameter(_flown, 1.0, symbol="Delta", unit="s")
+    map_side: float = parameter(_length, 200.0, symbol="l_max", unit="m")
+    altitude: float = parameter(_length, 80.0, symbol="h", unit="m")
+    eavesdropper_altitude: float = parameter(_length, 120.0, symbol="h_e", unit="m")
+    coverage_radius: float = parameter(_radius, 45.0, symbol="D_max", unit="m")
+    max_speed: float = parameter(_flown, 20.0, symbol="v_max", unit="m/s")
     speed_limit: str = parameter(choice("box", "disc"), "box")
-    off_map_penalty: float = parameter(_non_negative, 0.2, symbol="r_om", unit="bps/Hz")
-    helper_mass: float = parameter(_positive, 9.65, symbol="M", unit="kg")
+    off_map_penalty: float = parameter(_rate, 0.2, symbol="r_om", unit="bps/Hz")
+    helper_mass: float = parameter(_flown, 9.65, symbol="M", unit="kg")
     ue_power: float = parameter(_power, 0.1, symbol="p_u", unit="W")
     jamming_power: float = parameter(_power, 0.08, symbol="p_J", unit="W")
     relay_power: float = parameter(_power, 0.012, symbol="p_R", unit="W")
@@ -78,15 +85,15 @@ class Scenario(Parameters):
     ground_to_air_k_factor: float = parameter(_decibel, 12.0, symbol="K^G2A", unit="dB")
     air_to_air_k_factor: float = parameter(_decibel, 20.0, symbol="K^A2A", unit="dB")
     fading: bool = parameter(switch, True)
-    min_secrecy_rate: float = parameter(_non_negative, 0.1, symbol="epsilon", unit="bps/Hz")
+    min_secrecy_rate: float = parameter(_rate, 0.1, symbol="epsilon", unit="bps/Hz")
     task_size: tuple[float, float] = parameter(_range, (160e3, 240e3), symbol="S_u", unit="bit")
     cycles_per_bit: tuple[float, float] = parameter(
         _range, (1000.0, 1200.0), symbol="F_u", unit="cycle/bit"
     )
-    capacitance: float = parameter(_non_negative, 1e-27, symbol="kappa")
-    ue_energy_budget: float = parameter(_non_negative, 0.025, symbol="E_u", unit="J")
-    edge_energy_budget: float = parameter(_non_negative, 24.0, symbol="E_L", unit="J")
-    helper_energy_budget: float = parameter(_non_negative, 3900.0, symbol="E_H", unit="J")
+    capacitance: float = parameter(_capacitance, 1e-27, symbol="kappa")
+    ue_energy_budget: float = parameter(_budget, 0.025, symbol="E_u", unit="J")
+    edge_energy_budget: float = parameter(_budget, 24.0, symbol="E_L", unit="J")
+    helper_energy_budget: float = parameter(_budget, 3900.0, symbol="E_H", unit="J")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -94,12 +101,21 @@ class Scenario(Parameters):
             self._require_on_map(name, getattr(self, name))
         for index, position in enumerate(self.ue_positions):
             self._require_on_map(f"ue_positions[{index}]", position)
+        self._require_finite_load()
 
     def _require_on_map(self, name: str, position: Point) -> None:
         half = self.map_side / 2
         if max(abs(position[0]), abs(position[1])) > half:
             accepted = f"a position on the map, x and y in [{-half:g}, {half:g}] m"
             raise InputError(rejection(name, position, accepted))
+
+    def _require_finite_load(self) -> None:
+        """Accept tasks whose computing energy, with all UEs offloading, float32 can hold."""
+        cycles = self.num_ues * self.task_size[1] * self.cycles_per_bit[1]
+        power = (self.capacitance ** (1.0 / 3.0) * cycles / self.slot_duration) ** 3
+        if power * max(self.slot_duration, 1.0) > LARGEST_LOAD:
+            accepted = f"tasks of all UEs that take at most {LARGEST_LOAD:g} J or W to compute"
+            raise InputError(rejection("capacitance", self.capacitance, accepted))
 
     @property
     def num_ues(self) -> int:

@@ -16,6 +16,7 @@ from hyuav.dashboard.growing import GrowingMetrics, require_columns
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EVALUATION_FILE, OPTIMA
 from hyuav.metrics import parse_rows
+from hyuav.parameters import YAML_LOADER, require_plain_yaml
 from hyuav.runs import RunDirectory
 
 RUNNING_SECONDS = 120.0
@@ -36,8 +37,6 @@ _ROW_BYTES = 250
 
 _KEPT_METRICS = 24
 """Tables of metrics that are kept in memory."""
-
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 Stamp = tuple[int, ...]
 """Modification time in ns and size of each file from which an entry was made."""
@@ -232,7 +231,7 @@ def _read_config(path: Path) -> Mapping[str, Any]:
     try:
         if path.is_symlink() or path.stat().st_size > _LARGEST_CONFIG:
             return {}
-        values = yaml.load(path.read_bytes(), _LOADER)
+        values = yaml.load(require_plain_yaml(path), YAML_LOADER)
     except (OSError, yaml.YAMLError, ValueError, RecursionError):
         return {}
     return values if isinstance(values, dict) else {}
