@@ -22,6 +22,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from hyuav.configuration_files import read_files_as_data
 from hyuav.errors import Halted, InputError, Interrupted, require_choice
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.parameters import Parameters, refuse_unknown
@@ -114,6 +115,7 @@ def recipe(
         run.__module__ = "__main__"
 
         def command() -> None:
+            read_files_as_data()
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
             register(groups)
