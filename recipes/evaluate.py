@@ -17,7 +17,7 @@ from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EvaluationParameters, evaluate
 from hyuav.experiment import learned_policies, print_results, reference_policies
 from hyuav.figures import save_flight_map
-from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text
+from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text, thread_count
 from hyuav.report.page import write_run_report
 from hyuav.runs import RunDirectory, require_writable
 from hyuav.tracking import EvaluationLoggerParameters, log_evaluation
@@ -32,7 +32,7 @@ class Evaluate(Parameters):
     """The horizon, of whose learners the runs must have some; the scenario's where it is None."""
     output: str | None = parameter(optional(text), None)
     device: str = parameter(text, "cpu")
-    threads: int = parameter(count(), 1)
+    threads: int = parameter(thread_count, 1)
 
 
 @recipe(

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from hyuav.configuration import Config, recipe, section
 from hyuav.errors import InputError
-from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text
+from hyuav.parameters import Parameters, one_or_more, optional, parameter, text, thread_count
 from hyuav.report.page import write_report
 
 
@@ -22,7 +22,7 @@ class Report(Parameters):
 
     run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "directories")), None)
     """Directories of runs or comparisons, finished or not."""
-    threads: int = parameter(count(), 1)
+    threads: int = parameter(thread_count, 1)
 
 
 @recipe("report", Report, groups={}, sections={}, run_directory=".")

@@ -35,7 +35,16 @@ from hyuav.figures.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
 from hyuav.learning.algorithms import DDPG
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import Parameters, choice, count, one_or_more, optional, parameter, text
+from hyuav.parameters import (
+    Parameters,
+    choice,
+    count,
+    one_or_more,
+    optional,
+    parameter,
+    text,
+    thread_count,
+)
 from hyuav.report.page import write_run_report
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.scenario import PRESETS, Scenario
@@ -48,7 +57,7 @@ from hyuav.tracking import LoggerParameters, log_evaluation
 class Reproduce(Parameters):
     """How the main job is done."""
 
-    seeds: int = parameter(count(), 1)
+    seeds: int = parameter(count(1, 10_000), 1)
     num_slots: tuple[int, ...] | None = parameter(
         optional(one_or_more(count(), "numbers of slots")), None, symbol="T"
     )
@@ -61,12 +70,12 @@ class Reproduce(Parameters):
         optional(one_or_more(choice(*FIGURES), f"a list of {', '.join(FIGURES)}")), None
     )
     """To draw; None for all that these settings allow."""
-    candidates: int = parameter(count(), 5)
+    candidates: int = parameter(count(1, 1000), 5)
     """Of each scheme's initial weights, where it is trained as in the paper."""
     candidate_episodes: int = parameter(count(), 50)
     seed: int = parameter(count(0), 0)
     device: str = parameter(text, "cpu")
-    threads: int = parameter(count(), 1)
+    threads: int = parameter(thread_count, 1)
 
 
 @recipe(

@@ -23,7 +23,16 @@ from hyuav.errors import InputError, rejection
 from hyuav.experiment import resume, saved_weights, train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import Parameters, choice, count, one_or_more, optional, parameter, text
+from hyuav.parameters import (
+    Parameters,
+    choice,
+    count,
+    one_or_more,
+    optional,
+    parameter,
+    text,
+    thread_count,
+)
 from hyuav.report.page import write_run_report
 from hyuav.runs import RunConfiguration, RunDirectory, mapping
 from hyuav.system import SCHEMES
@@ -38,11 +47,11 @@ class Train(Parameters):
     num_slots: tuple[int, ...] | None = parameter(
         optional(one_or_more(count(), "numbers of slots")), None
     )
-    learners: int = parameter(count(), 1)
+    learners: int = parameter(count(1, 100_000), 1)
     """Of each scheme and horizon; their seeds follow ``seed``."""
     seed: int = parameter(count(0), 0)
     device: str = parameter(text, "cpu")
-    threads: int = parameter(count(), 1)
+    threads: int = parameter(thread_count, 1)
     warm_start: str | None = parameter(optional(text), None)
     resume: str | None = parameter(optional(text), None)
     """Directory of an interrupted training, with which to go on as it was configured."""

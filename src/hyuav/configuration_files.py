@@ -42,7 +42,7 @@ class DataFiles(FileConfigSource):
         except InputError as error:
             raise InputError(f"configuration file {brief(str(path))}: {error}") from None
         result = super().load_config(config_path)
-        if "package" in result.header:
+        if result.header.get("package") is not None:
             raise _refusal(path, "@package")
         for text in _texts(values):
             if text in ORDERS or "${" in text:

@@ -66,7 +66,7 @@ OPTIMA = {"hybrid": "optimum", "jamming": "ja_optimum", "relay": "re_optimum"}
 class EvaluationParameters(Parameters):
     """How to evaluate."""
 
-    episodes: int = parameter(count(2), 1000)
+    episodes: int = parameter(count(2, 10**6), 1000)
     flights: int = parameter(count(), 3)
     seed: int = parameter(count(0), 10_000)
     resolution: float = parameter(number(above=0.0), RESOLUTION, unit="m")

@@ -10,7 +10,8 @@ from hyuav.scenario import Point
 
 _length = number(0.0)
 _point = sequence(number(), "two coordinates (x, y) in metres", length=2)
-_sizes = sequence(count(), "the numbers of UEs of one cluster or more")
+_ues = count(1, 10**6)
+_sizes = sequence(_ues, "the numbers of UEs of one cluster or more")
 
 
 def disk(
@@ -31,7 +32,7 @@ def disk(
         InputError: ``num_ues`` below 1, ``radius`` below 0, or a value of the wrong type.
     """
     generator = torch.Generator().manual_seed(count(0)("seed", seed))
-    num_ues, radius = count()("num_ues", num_ues), _length("radius", radius)
+    num_ues, radius = _ues("num_ues", num_ues), _length("radius", radius)
     return _disk(num_ues, radius, _point("center", center), generator)
 
 

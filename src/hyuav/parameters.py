@@ -23,8 +23,14 @@ YAML_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 LARGEST_YAML = 2**22
 """Bytes of a file that is read; the positions of a hundred thousand UEs take fewer."""
 
+LONGEST_YAML = 3000
+"""Characters of a value; Python writes no number with many more digits."""
+
 DEEPEST_YAML = 20
 """Lists and mappings within each other; configurations have five."""
+
+MOST_THREADS = 1024
+"""More than any machine has use for, and few enough to be started."""
 
 Converter = Callable[[str, Any], Any]
 """Takes a field's name and a value; returns the value as it is kept, or raises InputError."""
@@ -79,6 +85,10 @@ def count(low: int = 1, high: int = 2**63 - 1) -> Converter:
         return result
 
     return convert
+
+
+thread_count = count(1, MOST_THREADS)
+"""Accept how many threads or processes work at the same time."""
 
 
 def switch(name: str, value: Any) -> bool:
@@ -199,6 +209,8 @@ def require_plain_yaml(path: Path) -> str:
     for event in yaml.parse(text, YAML_LOADER):
         if isinstance(event, yaml.AliasEvent):
             raise InputError("cannot be read (it has aliases)")
+        if isinstance(event, yaml.ScalarEvent) and len(event.value) > LONGEST_YAML:
+            raise InputError(f"cannot be read (a value of more than {LONGEST_YAML} characters)")
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST_YAML:

@@ -22,6 +22,7 @@ from hyuav.parameters import (
     one_or_more,
     parameter,
     text,
+    thread_count,
 )
 from hyuav.recording import cores
 from hyuav.scenario import PRESETS, Scenario
@@ -72,7 +73,7 @@ class Compare(Parameters):
     without: tuple[str, ...] = parameter(_pieces, ())
     """Pieces of a variant, such as ``clock``: it is compared once more for each, without it."""
     scenario: tuple[str, ...] = parameter(_presets, ("random_disk", "two_clusters"))
-    layouts: int = parameter(count(0), 0)
+    layouts: int = parameter(count(0, 100_000), 0)
     """Random layouts, besides the presets; see :func:`hyuav.layouts.random_layout`."""
     layouts_seed: int = parameter(count(0), 1000)
     """Of the first; the others follow."""
@@ -80,7 +81,7 @@ class Compare(Parameters):
     num_slots: tuple[int, ...] = parameter(
         one_or_more(count(), "numbers of slots"), (10, 20), symbol="T"
     )
-    learners: int = parameter(count(), 10)
+    learners: int = parameter(count(1, 100_000), 10)
     """Of each algorithm, scenario, scheme and horizon; their seeds follow ``seed``."""
     seed: int = parameter(count(0), 0)
     threshold: float = parameter(number(0.0, 1.0), 0.97)
@@ -91,7 +92,7 @@ class Compare(Parameters):
     """What the workers are: processes of this machine, or those of Ray (extra ``cluster``)."""
     address: str = parameter(text, LOCAL)
     """Of Ray: one that is started for the work, "auto" for one that runs here, or HOST:PORT."""
-    workers: int = parameter(count(), cores())
+    workers: int = parameter(thread_count, cores())
     """That train at the same time, by default as many as cores; one process is this one. A Ray
     that runs has its own."""
     retries: int = parameter(count(0), 2)

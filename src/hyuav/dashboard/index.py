@@ -1,6 +1,7 @@
 """The runs below a directory: found, summarised and read, though some are still being written."""
 
 import json
+import math
 import os
 import threading
 from collections import OrderedDict
@@ -189,9 +190,11 @@ class RunIndex:
         found = {}
         for rule, scheme in OPTIMA.items():
             try:
-                found[rule] = float(content["schemes"][scheme]["secrecy_sum_rate"]["mean"])
-            except (KeyError, TypeError, ValueError):
+                mean = float(content["schemes"][scheme]["secrecy_sum_rate"]["mean"])
+            except (KeyError, TypeError, ValueError, OverflowError, IndexError):
                 continue
+            if math.isfinite(mean):
+                found[rule] = mean
         return found
 
     def metrics(self, name: str) -> pd.DataFrame:

@@ -16,8 +16,9 @@ from hyuav.envs.arguments import as_device
 from hyuav.errors import InputError, InputTypeError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.cohort import Cohort, Earned, Learner
+from hyuav.learning.memory import require_memory
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
-from hyuav.parameters import Parameters, choice, count, number, parameter
+from hyuav.parameters import Parameters, choice, count, number, parameter, thread_count
 from hyuav.recording import COMPILATION_ERRORS, cores, has_compiler
 from hyuav.scenario import Scenario
 
@@ -42,7 +43,7 @@ class TrainingParameters(Parameters):
     evaluation_episodes: int = parameter(count(), 100)
     evaluation_seed: int = parameter(count(0), 20_000)
     compile: str = parameter(choice("auto", "always", "never"), "auto")
-    cohorts: int = parameter(count(), cores())
+    cohorts: int = parameter(thread_count, cores())
     """Groups of learners that are trained at the same time, each on a thread of its own; by default
     one for each core."""
     checkpoint_every: float = parameter(number(0.0), 20.0, unit="s")
@@ -53,6 +54,12 @@ class TrainingParameters(Parameters):
         if self.batch_size > self.replay_size:
             accepted = f"at most replay_size = {self.replay_size}"
             raise InputError(rejection("batch_size", self.batch_size, accepted))
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """What decides how much memory a learner takes."""
+        names = ("replay_size", "batch_size", "evaluation_episodes")
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -115,6 +122,9 @@ class Training:
         if algorithm.repeat_every and parameters.replay_size < longest:
             accepted = f"at least the {longest} slots of a flight, for repeat_every"
             raise InputError(rejection("replay_size", parameters.replay_size, accepted))
+        require_memory(
+            scenario.num_ues, self.horizons, algorithm, parameters.sizes, as_device(device)
+        )
         self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
         self.cohorts = [
             Cohort(

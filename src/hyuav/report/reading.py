@@ -1,7 +1,7 @@
 """Read what a directory holds, as far as it can be read: it may be unfinished or damaged."""
 
 import json
-import math
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ def readable_evaluation(directory: Path) -> dict[str, Any] | None:
     try:
         content = json.loads((directory / EVALUATION_FILE).read_text(encoding="utf-8"))
         complete = all(_is_account(account) for account in content["schemes"].values())
-        whole = all(isinstance(content[name], int) for name in ("num_slots", "episodes"))
+        whole = all(type(content[name]) is int for name in ("num_slots", "episodes"))
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
     return content if complete and whole else None
@@ -48,7 +48,8 @@ def _is_account(account: dict[str, Any]) -> bool:
     needed = [rate["mean"], low, high, *(account[name] for name in _ACCOUNT)]
     optional = [account.get(f"fraction_of_{name}", 0.0) for name in ("optimum", "hybrid_optimum")]
     return all(
-        isinstance(value, int | float) and math.isfinite(value) for value in needed + optional
+        isinstance(value, int | float) and abs(value) <= sys.float_info.max
+        for value in needed + optional
     )
 
 

@@ -1,0 +1,67 @@
+"""How much memory a training takes, estimated before any of it is taken."""
+
+import math
+import os
+from itertools import pairwise
+
+import torch
+
+from hyuav.errors import InputError, rejection
+from hyuav.learning.algorithms import AlgorithmParameters
+
+COPIES = 16
+"""Of the weights of the largest network: networks, targets, moments, gradients and best weights."""
+
+_FLOAT = 4
+"""Bytes."""
+
+
+def require_memory(
+    num_ues: int,
+    horizons: tuple[int, ...],
+    algorithm: AlgorithmParameters,
+    sizes: dict[str, int],
+    device: torch.device,
+) -> None:
+    """Accept a training that the device can hold.
+
+    Args:
+        num_ues: U.
+        horizons: T of each learner.
+        algorithm: whose networks are built for each.
+        sizes: ``replay_size``, ``batch_size`` and ``evaluation_episodes``.
+        device: of all tensors.
+
+    Raises:
+        InputError: naming what takes most, and how much there is.
+    """
+    learners, observed = len(horizons), num_ues + 6
+    layers = (observed + 2, *algorithm.hidden_sizes, 2)
+    widths = sum(layers)
+    needed = {
+        "hidden_sizes": learners * COPIES * sum((low + 1) * high for low, high in pairwise(layers)),
+        "replay_size": learners * sizes["replay_size"] * (2 * observed + 6),
+        "batch_size": learners * sizes["batch_size"] * 2 * widths,
+        "evaluation_episodes": learners * sizes["evaluation_episodes"] * 4 * observed,
+        "num_slots": 4 * sum(horizons),
+    }
+    available = device_memory(device)
+    if _FLOAT * sum(needed.values()) > available:
+        name = max(needed, key=needed.__getitem__)
+        value = {"hidden_sizes": list(algorithm.hidden_sizes), "num_slots": max(horizons)} | sizes
+        accepted = (
+            f"a training of {learners} learners that fits the device's "
+            f"{available / 2**30:.3g} GiB: this one takes about "
+            f"{_FLOAT * sum(needed.values()) / 2**30:.3g} GiB"
+        )
+        raise InputError(rejection(name, value[name], accepted))
+
+
+def device_memory(device: torch.device) -> float:
+    """Bytes that the device has; infinity where that cannot be known."""
+    if device.type == "cuda":
+        return float(torch.cuda.get_device_properties(device).total_memory)
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return math.inf
