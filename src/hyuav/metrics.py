@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,6 +36,16 @@ def parse_rows(lines: bytes, columns: Sequence[str]) -> pd.DataFrame:
         low_memory=False,
     )
     for name in rows.columns.drop("scheme"):
-        numbers = pd.to_numeric(rows[name], errors="coerce").astype("float64")
-        rows[name] = numbers.where(np.isfinite(numbers))
+        rows[name] = finite_numbers(rows[name])
     return rows.dropna(subset=list(IDENTITY)).reset_index(drop=True)
+
+
+def finite_numbers(column: "pd.Series[Any]") -> "pd.Series[float]":
+    """A column as float64, in which whatever is no finite number is NaN."""
+    try:
+        numbers = pd.to_numeric(column, errors="coerce").astype("float64")
+    except OverflowError:  # a whole number of hundreds of digits
+        written = column.astype(str)
+        numbers = pd.to_numeric(written.where(written.str.len() < 300), errors="coerce")
+        numbers = numbers.astype("float64")
+    return numbers.where(np.isfinite(numbers))

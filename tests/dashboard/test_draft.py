@@ -44,7 +44,7 @@ def test_what_is_shown_of_a_number_reads_as_the_same_number() -> None:
         ("ue_power", "much", "ue_power = 'much': expected a number in [0, 1e+06]"),
         ("ue_power", "", "ue_power = '': expected a number in [0, 1e+06]"),
         ("noise_power", "0", "noise_power = 0.0: expected a number in [1e-24, 1e+06]"),
-        ("max_speed", "nan", "max_speed = nan: expected a finite number > 0"),
+        ("max_speed", "nan", "max_speed = nan: expected a number in [1e-09, 1e+09]"),
         ("task_size", "5", "task_size = [5.0]: expected two numbers (low, high)"),
         ("task_size", "9, 5", "task_size = [9.0, 5.0]: expected two numbers (low, high)"),
     ],
