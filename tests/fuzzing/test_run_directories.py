@@ -44,12 +44,11 @@ def draw_metrics(path: Path) -> None:
     """By the report and by the dashboard."""
     rows = readable_metrics(path)
     assert np.isfinite(rows["episode"]).all()
-    learning_figure(rows).to_json()
+    learning_figure(rows)
     index = RunIndex(path.parent.parent)
     index.entries()
     metrics = {"run": GrowingMetrics(path).read()}
-    for x in curves.X_AXES:
-        curves.comparison(metrics, {}, curves.Choice(x=x)).to_json()
+    curves.comparison(metrics, {}, curves.Choice())
     tables.outcomes(metrics, curves.Choice())
 
 
@@ -144,11 +143,9 @@ def show_flights(path: Path, scenario: Scenario) -> None:
     flights = readable_flights(path.parent)
     state = path.stat()
     read_flights.cache_clear()
-    kept = read_flights(path, (state.st_mtime_ns, state.st_size))
-    for table in (flights, kept):
-        if table is not None:
-            scheme = table["scheme"].iloc[0]
-            flight_player(scenario, table, scheme, table["episode"].iloc[0]).to_json()
+    if flights is not None:
+        flight_player(scenario, flights, flights["scheme"].iloc[0], flights["episode"].iloc[0])
+    read_flights(path, (state.st_mtime_ns, state.st_size))
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from pyarrow.lib import ArrowException
 
@@ -13,10 +14,11 @@ from hyuav.errors import InputError
 from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.parameters import read_yaml
 
+_PER_UE = {"offloading", "secrecy_rate", "ue_energy"}
 _FLIGHT_COLUMNS = {
     *("scheme", "episode", "slot", "x", "y", "relay", "off_map", "secrecy_sum_rate"),
     *("relay_sum_rate", "jamming_sum_rate", "edge_energy", "helper_energy"),
-    *("offloading", "secrecy_rate", "ue_energy"),
+    *_PER_UE,
 }
 _ACCOUNT = {"relay_share", "offloading_share", "off_map", "budget_violations"} | {
     *("ue_energy", "edge_energy", "helper_energy")
@@ -55,7 +57,19 @@ def _is_account(account: dict[str, Any]) -> bool:
 
 def readable_flights(directory: Path) -> pd.DataFrame | None:
     """The rows of ``flights.parquet``; None where there are none that can be read."""
-    return readable_table(directory / FLIGHTS_FILE, _FLIGHT_COLUMNS)
+    table = readable_table(directory / FLIGHTS_FILE, _FLIGHT_COLUMNS)
+    return table if table is not None and _is_flown(table) else None
+
+
+def _is_flown(table: pd.DataFrame) -> bool:
+    """Whether all that is drawn of flights are finite numbers, a list of them for the UEs."""
+    numbers = sorted(_FLIGHT_COLUMNS - _PER_UE - {"scheme"})
+    try:
+        drawn = [table[numbers].to_numpy(float).ravel()]
+        drawn += [np.asarray(own, dtype=float) for name in _PER_UE for own in table[name]]
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return all(own.ndim == 1 and np.isfinite(own).all() for own in drawn)
 
 
 def readable_table(path: Path, columns: Iterable[str]) -> pd.DataFrame | None:
