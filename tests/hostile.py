@@ -16,19 +16,19 @@ TRIED: Counter[tuple[str, str]] = Counter()
 """How many inputs of each kind worked and how many were refused, in this process."""
 
 CASES = {
-    "scenario": 3000,
-    "extreme scenario": 500,
-    "YAML file": 2000,
-    "configuration": 1500,
-    "options": 1000,
-    "command line": 100,
-    "checkpoint, bytes": 800,
-    "checkpoint, content": 500,
-    "metrics": 700,
+    "scenario": 2500,
+    "extreme scenario": 300,
+    "YAML file": 1200,
+    "configuration": 1200,
+    "options": 2200,
+    "command line": 60,
+    "checkpoint, bytes": 600,
+    "checkpoint, content": 200,
+    "metrics": 300,
     "evaluation": 500,
-    "flights": 200,
-    "run directory": 100,
-    "name": 800,
+    "flights": 100,
+    "run directory": 30,
+    "name": 1210,
 }
 """Of each kind at least, in one run."""
 
@@ -36,10 +36,8 @@ CASES = {
 def fuzz(kind: str) -> settings:
     """The settings of a test that tries inputs of a kind."""
     suppressed = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
-    from hypothesis import Phase
     return settings(
-        phases=[Phase.explicit, Phase.generate],
-        max_examples=int((CASES[kind] + CASES[kind] // 20) * float(__import__("os").environ.get("FZ", "1"))),
+        max_examples=CASES[kind] + CASES[kind] // 20,
         suppress_health_check=[*suppressed, HealthCheck.data_too_large],
     )
 
@@ -51,14 +49,6 @@ def attempt(kind: str, action: Callable[[], Result]) -> Result | None:
     except InputError as error:
         require_one_line(str(error))
         TRIED[kind, "refused"] += 1
-        return None
-    except Exception:
-        import traceback
-        t = traceback.format_exc().splitlines()
-        with open("/tmp/fz_debug.txt", "a") as f:
-            own = [l.strip() for l in t if "/tmp/wt_i/src" in l]
-            f.write(kind + " | " + " | ".join(own[-3:]) + " | " + t[-1][:200] + "\n")
-        TRIED[kind, "TRACE"] += 1
         return None
     TRIED[kind, "worked"] += 1
     return result
