@@ -212,9 +212,7 @@ def test_slots_are_counted_in_whole_numbers(count: int) -> None:
 
 def test_tasks_whose_energy_no_float32_holds_are_refused() -> None:
     changes: dict[str, Any] = {"task_size": (0, 1e12), "cycles_per_bit": (0, 1e12)}
-    with pytest.raises(
-        InputError, match=r"^capacitance = 1\.0: expected tasks of all UEs"
-    ):
+    with pytest.raises(InputError, match=r"^capacitance = 1\.0: expected tasks of all UEs"):
         dataclasses.replace(TWO_CLUSTERS, capacitance=1, **changes)
 
 

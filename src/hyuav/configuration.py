@@ -23,7 +23,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from hyuav.configuration_files import read_files_as_data
-from hyuav.errors import Halted, InputError, Interrupted, require_choice
+from hyuav.errors import Halted, InputError, Interrupted, one_line, require_choice
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.parameters import Parameters, refuse_unknown
 from hyuav.scenario import PRESETS, Scenario
@@ -228,7 +228,7 @@ def explain(error: Exception) -> str:
                 return _message(lambda: refuse_unknown(owner or "configuration", [key], names))
         error = cause
     text = str(error).split("\n    full_key")[0].split("\nSee https")[0]
-    return " ".join(text.split())
+    return one_line(text)
 
 
 def _refuse(line: str) -> NoReturn:

@@ -41,6 +41,11 @@ class Halted(Exception):  # noqa: N818 - nothing was wrong with what was asked f
         self.resumable = resumable
 
 
+def one_line(text: str) -> str:
+    """Text of unknown origin on one line, without characters that a terminal would obey."""
+    return "".join(own if own.isprintable() else "?" for own in " ".join(text.split()))
+
+
 def brief(value: object) -> str:
     """A value on one line, shortened, without characters that a terminal would obey."""
     try:

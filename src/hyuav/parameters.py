@@ -15,7 +15,7 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from hyuav.errors import InputError, InputTypeError, brief, rejection, require_choice
+from hyuav.errors import InputError, InputTypeError, brief, one_line, rejection, require_choice
 
 YAML_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """Knows plain values alone; deep nesting would crash the fast one, were it not looked for first."""
@@ -230,7 +230,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
         if isinstance(error, InputError):
             raise
-        reason = " ".join(str(error).split())[:200]
+        reason = one_line(str(error))[:200]
         raise InputError(f"cannot be read ({reason})") from None
     if not isinstance(values, dict):
         raise InputError("expected fields with values")

@@ -6,6 +6,7 @@ from pathlib import Path
 import plotly.graph_objects as go
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from hostile import CASES, PAYLOADS, TRIED, attempt, file_names, fuzz, texts
 from hyuav import Scenario
@@ -58,7 +59,7 @@ def test_a_hostile_name_leads_nowhere_and_is_shown_as_text(tmp_path: Path) -> No
     index = RunIndex(root)
 
     @fuzz(kind)
-    @given(texts | file_names, texts)
+    @given(texts | file_names, st.sampled_from(["config.yaml", "checkpoints", "."]))
     def try_one(name: str, part: str) -> None:
         show(name)
         attempt("saved name", lambda: draft.save(SCENARIO, root, name, replace=True))

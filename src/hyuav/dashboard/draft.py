@@ -181,5 +181,5 @@ def load(root: Path, name: str) -> Scenario:
         InputError: there is no such scenario, or the file does not hold one.
     """
     if name not in saved(root):
-        raise InputError(rejection("scenario", name, f"one of {', '.join(saved(root))}"))
+        raise InputError(rejection("scenario", name, "one that was saved"))
     return Scenario.load(root / SCENARIOS / f"{name}.yaml")

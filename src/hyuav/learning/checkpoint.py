@@ -53,7 +53,7 @@ def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "c
     if stored.get("kind") != kind:
         reason = f"this one is of kind {stored.get('kind')!r}"
         raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})"))
-    return stored["content"]
+    return stored.get("content")
 
 
 def _load(path: Path, device: torch.device | str) -> Any:
@@ -77,9 +77,17 @@ def load_weights_file(path: str | Path) -> dict[str, Tensor]:
         isinstance(values, Tensor)
         and values.is_floating_point()
         and values.ndim >= 2
+        and _is_whole(values)
         and bool(values.isfinite().all())
         for values in weights.values()
     )
     if not by_name or not weights:
         raise InputError(rejection("checkpoint", str(path), "finite weights by name"))
     return weights
+
+
+def _is_whole(values: Tensor) -> bool:
+    """Whether a number is stored for each element: a few bytes may claim to be a huge tensor."""
+    if values.layout != torch.strided or values.device.type == "meta":
+        return False
+    return values.numel() * values.element_size() <= values.untyped_storage().nbytes()

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from hyuav.envs.arguments import as_device
-from hyuav.errors import InputError, InputTypeError, rejection
+from hyuav.errors import InputError, InputTypeError, one_line, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.cohort import Cohort, Earned, Learner
 from hyuav.learning.memory import require_memory
@@ -324,8 +324,11 @@ class Training:
             for cohort, own in zip(self.cohorts, state["cohorts"], strict=True):
                 cohort.load_state_dict(own)
             self._can_compile = bool(state["can_compile"])
-        except (KeyError, RuntimeError, ValueError, TypeError, AttributeError) as error:
-            reason = " ".join(str(error).split())
+        except (
+            *(LookupError, RuntimeError, ValueError, TypeError, AttributeError),
+            *(ArithmeticError, AssertionError),
+        ) as error:
+            reason = one_line(str(error))[:200]
             raise InputError(f"checkpoint: not of a training like this one ({reason})") from None
 
 

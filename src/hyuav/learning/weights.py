@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torchrl.objectives import LossModule
 
-from hyuav.errors import InputError
+from hyuav.errors import InputError, brief
 from hyuav.randomness import derived_seed
 
 
@@ -95,7 +95,14 @@ def count_learners(weights: dict[str, Tensor]) -> int:
 
 
 def select_learner(weights: dict[str, Tensor], learner: int) -> dict[str, Tensor]:
-    """The weights of one learner, with a learner axis of length one."""
+    """The weights of one learner, with a learner axis of length one.
+
+    Raises:
+        InputError: some are of fewer learners.
+    """
+    for name, values in weights.items():
+        if not 0 <= learner < values.shape[_learner_axis(values)]:
+            raise InputError(f"checkpoint: {brief(name)} is not of {learner + 1} learners or more")
     return {
         name: values.narrow(_learner_axis(values), learner, 1) for name, values in weights.items()
     }
