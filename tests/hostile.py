@@ -36,10 +36,7 @@ CASES = {
 def fuzz(kind: str) -> settings:
     """The settings of a test that tries inputs of a kind."""
     suppressed = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
-    from hypothesis import Phase
-
     return settings(
-        phases=[Phase.explicit, Phase.generate],
         max_examples=CASES[kind] + CASES[kind] // 20,
         suppress_health_check=[*suppressed, HealthCheck.data_too_large],
     )

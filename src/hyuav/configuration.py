@@ -115,6 +115,8 @@ def recipe(
         run.__module__ = "__main__"
 
         def command() -> None:
+            nonlocal composed
+            composed = False
             read_files_as_data()
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
