@@ -280,7 +280,7 @@ def readable_metrics(path: str | Path) -> pd.DataFrame:
         path: of the file.
     """
     try:
-        content = Path(path).read_bytes()
+        content = Path(path).read_bytes() if Path(path).is_file() else b""  # a pipe never ends
     except OSError:
         content = b""
     header, _, lines = content[: content.rfind(b"\n") + 1].partition(b"\n")

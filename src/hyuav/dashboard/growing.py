@@ -40,6 +40,8 @@ class GrowingMetrics:
         Raises:
             InputError: the file cannot be opened, or its columns are not those of a training.
         """
+        if self.path.exists() and not self.path.is_file():  # a device may have no end
+            raise InputError(rejection("metrics", str(self.path), "a file"))
         try:
             with self.path.open("rb") as file:
                 if not self._continues(file):

@@ -35,6 +35,8 @@ def readable_config(directory: Path) -> dict[str, Any]:
 
 def readable_evaluation(directory: Path) -> dict[str, Any] | None:
     """The content of ``evaluation.json``; None where there is none that can be read."""
+    if not (directory / EVALUATION_FILE).is_file():  # a pipe would be waited for
+        return None
     try:
         content = json.loads((directory / EVALUATION_FILE).read_text(encoding="utf-8"))
         complete = all(_is_account(account) for account in content["schemes"].values())
@@ -74,6 +76,8 @@ def _is_flown(table: pd.DataFrame) -> bool:
 
 def readable_table(path: Path, columns: Iterable[str]) -> pd.DataFrame | None:
     """A Parquet file with at least these columns; None where it is none, yet, or has no rows."""
+    if not path.is_file():
+        return None
     try:
         table = pd.read_parquet(path)
     except (OSError, ValueError, ArrowException):
