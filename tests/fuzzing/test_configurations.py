@@ -50,7 +50,7 @@ WHOLE = RunConfiguration(
 
 SECTIONS = st.one_of(
     *(
-        damaged(section).map(lambda changed, name=name: {**WHOLE, name: changed})
+        st.builds(lambda name, changed: {**WHOLE, name: changed}, st.just(name), damaged(section))
         for name, section in WHOLE.items()
         if isinstance(section, dict)
     ),
