@@ -36,6 +36,7 @@ SHARED = {
         "hyuav.interruption",
         "hyuav.cluster",
         "hyuav.configuration",
+        "hyuav.configuration_files",
         "hyuav.terminal",
     ),
 }
