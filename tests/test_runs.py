@@ -1,7 +1,6 @@
 import dataclasses
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from hyuav import InputError, Scenario
@@ -13,7 +12,6 @@ from hyuav.runs import (
     METRIC_COLUMNS,
     RunConfiguration,
     RunDirectory,
-    finite_numbers,
     named_algorithm,
     named_scenario,
     readable_metrics,
@@ -92,15 +90,6 @@ def test_a_directory_that_is_no_run_is_refused_in_one_line(
 def test_a_bad_entry_of_a_configuration_is_named(entry: str, value: object) -> None:
     with pytest.raises(InputError, match=rf"^[^\n]*{entry.rstrip('s')}|^[^\n]*(discount|num_ep)"):
         RunConfiguration.from_dict({**CONFIGURATION.to_dict(), entry: value})
-
-
-@pytest.mark.parametrize("value", ["1" * 400, "inf", "-inf", "1e999", "nan", "x", "0x10", ""])
-def test_what_is_no_finite_number_in_metrics_is_none(value: str) -> None:
-    assert finite_numbers(pd.Series([value, "2"])).isna().tolist() == [True, False]
-
-
-def test_a_whole_number_of_hundreds_of_digits_leaves_the_others() -> None:
-    assert finite_numbers(pd.Series([10**400, 3])).fillna(-1.0).tolist() == [-1.0, 3.0]
 
 
 def test_a_scenario_may_name_a_preset_and_change_it() -> None:
