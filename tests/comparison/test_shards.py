@@ -153,7 +153,8 @@ def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: 
     with Tracker(run, configuration, training, broken.logger, Console(quiet=True)) as tracker:
         for episode in training.episodes():
             tracker.log(episode)
-            if episode.number == 3:  # one after the last evaluation, and so the checkpoint
+            if episode.number == 3:
+                tracker.save()
                 break
     os.utime(run.config_file, (1.0, 1.0))
     broken.run()

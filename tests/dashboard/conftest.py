@@ -1,6 +1,7 @@
 """Runs for the dashboard's tests: one that was trained, and any that are written at will."""
 
 import shutil
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -38,3 +39,12 @@ def runs(trained: Path, tmp_path: Path) -> Path:
 def write(tmp_path: Path) -> WriteRun:
     """Write runs below ``runs`` in the test's directory."""
     return partial(write_run, tmp_path / "runs")
+
+
+@pytest.fixture(autouse=True)
+def the_same_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put back the main module, in whose place Streamlit's tests leave a page's.
+
+    Processes that are started later would run that page.
+    """
+    monkeypatch.setitem(sys.modules, "__main__", sys.modules["__main__"])

@@ -79,7 +79,7 @@ def test_a_foreign_checkpoint_is_refused_and_a_mended_one_taken(runs: Path) -> N
     index, file = RunIndex(runs), runs / "tiny" / "checkpoints" / "best.pt"
     kept = file.read_bytes()
     file.write_bytes(kept[:100])
-    with pytest.raises(InputError, match="not a checkpoint, or truncated"):
+    with pytest.raises(InputError, match="not a checkpoint, truncated or damaged"):
         flown_by(SCENARIO, "hybrid", checkpoint_of(index, "tiny", 0))
     file.write_bytes(kept)
     assert len(flown_by(SCENARIO, "hybrid", checkpoint_of(index, "tiny", 0)).flights) == 30

@@ -105,6 +105,7 @@ def test_the_defaults_are_the_papers() -> None:
         "action_stretch": 1.0,
         "saturation_penalty": 0.0,
         "alternatives_weight": 0.0,
+        "recency": 1.0,
         "return_bound": 0.0,
         "return_bound_decay": 1.0,
         "noise_floor": 0.0,
