@@ -50,7 +50,7 @@ def test_a_recipe_that_changes_a_default_shows_its_own() -> None:
 
 def test_a_row_gives_default_check_unit_symbol_and_meaning() -> None:
     by_name = {row[0]: row for row in rows(table(Scenario))}
-    shown = ["`max_speed`", "`20`", "a finite number > 0", "m/s", r"$v_{\mathrm{max}}$"]
+    shown = ["`max_speed`", "`20`", "a number in [1e-09, 1e+09]", "m/s", r"$v_{\mathrm{max}}$"]
     assert by_name["`max_speed`"] == shown
     assert by_name["`ue_positions`"][1] == "required"
     clock = {row[0]: row for row in rows(table(DDPG))}["`clock`"]

@@ -34,9 +34,9 @@ class DDPG(AlgorithmParameters):
     """Of the standard deviation."""
     action_stretch: float = parameter(number(1.0, 2.0), 1.0)
     """Of the actor's tanh; see :class:`hyuav.learning.networks.StretchedTanh`."""
-    saturation_penalty: float = parameter(number(0.0), 0.0)
+    saturation_penalty: float = parameter(number(0.0, 1e6), 0.0)
     """Weight of :func:`saturation` in the actor's loss."""
-    alternatives_weight: float = parameter(number(0.0), 0.0)
+    alternatives_weight: float = parameter(number(0.0, 1e6), 0.0)
     """How strongly the actor is drawn to the best of :func:`alternatives` where that is worth more
     than what it does; with any weight, the critics' target counts whichever is worth more."""
 

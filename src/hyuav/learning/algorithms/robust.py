@@ -23,7 +23,7 @@ class Robust(AlgorithmParameters):
     clock: bool = parameter(switch, True)
     geofence: bool = parameter(switch, True)
     finite_horizon: bool = parameter(switch, True)
-    reward_scale: float = parameter(number(above=0.0), 0.05)
+    reward_scale: float = parameter(number(1e-9, 1e9), 0.05)
     layer_norm: bool = parameter(switch, True)
     warm_up_episodes: int = parameter(count(0), 100)
     repeat_every: int = parameter(count(0), 4)
@@ -42,8 +42,8 @@ class RobustDDPG(Robust, DDPG):
     noise_decay_per: str = parameter(choice("slot", "episode"), "episode")
     noise_floor: float = parameter(number(0.0, 1.0), 0.25)
     action_stretch: float = parameter(number(1.0, 2.0), 1.04)
-    saturation_penalty: float = parameter(number(0.0), 0.1)
-    alternatives_weight: float = parameter(number(0.0), 0.1)
+    saturation_penalty: float = parameter(number(0.0, 1e6), 0.1)
+    alternatives_weight: float = parameter(number(0.0, 1e6), 0.1)
 
 
 @dataclass(frozen=True)
