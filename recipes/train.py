@@ -106,9 +106,9 @@ def go_on(path: str, config: Config) -> None:
         if not name.startswith("logger."):
             accepted = "nothing beside it but device, threads and logger"
             raise InputError(f"{rejection('resume', path, accepted)}, not {name}")
-    begun = {**config, **RunDirectory(path).request()}
-    for name in given() & {"device", "threads"}:
-        begun[name] = config[name]
+    asked = RunDirectory(path).request()
+    kept = {"device", "threads", "logger"} & asked.keys() - given()
+    begun = {**config, **{name: asked[name] for name in kept}}
     options = section({**begun, "resume": path}, Train)
     own = {name: value for name, value in config["logger"].items() if f"logger.{name}" in given()}
     logger = LoggerParameters.from_dict({**mapping("logger", begun["logger"]), **own})

@@ -89,6 +89,18 @@ def test_an_evaluation_needs_a_place_to_write_to(
     assert "output = 'file" in refusal("evaluate", "run=run", "output=file")
 
 
+def test_a_training_goes_on_as_it_was_configured(
+    call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call("train", *TINY, "learners=2", "hydra.run.dir=begun")
+    metrics = (tmp_path / "begun" / "metrics.csv").read_bytes()
+    capsys.readouterr()
+    call("train", "resume=begun", "logger.name=later")  # which has nothing left to do
+    assert "run: begun" in capsys.readouterr().out
+    assert (tmp_path / "begun" / "metrics.csv").read_bytes() == metrics
+    assert "not seed" in refusal("train", "resume=begun", "seed=1")
+
+
 def test_training_starts_from_another_runs_weights(call: Call, tmp_path: Path) -> None:
     call("train", "hydra.run.dir=first", *SHORT)
     call("train", "warm_start=first", "learners=2", "hydra.run.dir=second", *SHORT)

@@ -23,7 +23,7 @@ LONG = [
     "algorithm.hidden_sizes=[8]",
     "scenario.num_slots=5",
     "logger.mode=disabled",
-    "hydra.run.dir=a, run",
+    'hydra.run.dir="a, run"',
 ]
 
 
