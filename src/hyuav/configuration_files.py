@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hydra._internal.core_plugins.file_config_source import FileConfigSource
+from hydra._internal.core_plugins import file_config_source
 from hydra._internal.sources_registry import SourcesRegistry
 from hydra.core.plugins import Plugins
 from hydra.plugins.config_source import ConfigResult
@@ -17,13 +17,18 @@ ORDERS = ("defaults", "hydra", "_target_")
 
 
 def read_files_as_data() -> None:
-    """Have Hydra read files, as those of ``--config-dir``, by :class:`DataFiles` from now on."""
+    """From now on Hydra reads files, as those of ``--config-dir``, by :class:`FileConfigSource`.
+
+    So do the workers of its launchers, to which Hydra hands over what is registered.
+    """
     Plugins.instance()  # which registers Hydra's own way when it is made
-    SourcesRegistry.instance().types[DataFiles.scheme()] = DataFiles
+    SourcesRegistry.instance().types[FileConfigSource.scheme()] = FileConfigSource
 
 
-class DataFiles(FileConfigSource):
+class FileConfigSource(file_config_source.FileConfigSource):
     """Files that hold names with plain values, as :meth:`hyuav.parameters.Parameters.save` writes.
+
+    It bears the name of Hydra's own, which a worker would otherwise not find in its place.
 
     Hydra would let a file call any function (``hydra.callbacks``), write anywhere
     (``hydra.run.dir``) and copy the environment (``${oc.env:...}``), which is not to be expected of
