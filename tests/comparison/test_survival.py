@@ -79,12 +79,13 @@ def assert_equal(directory: Path, expected: list[pd.DataFrame]) -> None:
 
 
 def wait_for_checkpoint(directory: Path) -> Path:
-    """The first shard under way that has one."""
+    """The first shard under way that has one and has begun to report."""
     limit = time.monotonic() + 10 * MINUTES
     while time.monotonic() < limit:
-        found = sorted(directory.glob("shards/*.partial/checkpoints/best.pt"))
-        if found:
-            return found[0].parents[1]
+        for metrics in directory.glob("shards/*.partial/metrics.csv"):
+            begun = (metrics.parent / "checkpoints/last.pt").exists()
+            if begun and metrics.read_bytes().count(b"\n") > 1:
+                return metrics.parent
         time.sleep(0.05)
     raise AssertionError("no shard was under way")
 
