@@ -40,7 +40,7 @@ class AlgorithmParameters(Parameters, ABC):
     """Slow flights so that they end on the map."""
     finite_horizon: bool = parameter(switch, False)
     """The last slot ends the return: no value is expected beyond it."""
-    reward_scale: float = parameter(number(1e-9, 1e9), 1.0)
+    reward_scale: float = parameter(number(above=0.0), 1.0)
     layer_norm: bool = parameter(switch, False)
     """In the critics."""
     warm_up_episodes: int = parameter(count(0), 0)

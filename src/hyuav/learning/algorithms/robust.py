@@ -23,7 +23,7 @@ class Robust(AlgorithmParameters):
     clock: bool = parameter(switch, True)
     geofence: bool = parameter(switch, True)
     finite_horizon: bool = parameter(switch, True)
-    reward_scale: float = parameter(number(1e-9, 1e9), 0.05)
+    reward_scale: float = parameter(number(above=0.0), 0.05)
     layer_norm: bool = parameter(switch, True)
     warm_up_episodes: int = parameter(count(0), 100)
     repeat_every: int = parameter(count(0), 4)
