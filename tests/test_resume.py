@@ -15,9 +15,8 @@ from rich.console import Console
 from faults import small_disk
 from hyuav import InputError
 from hyuav.errors import Halted
-from hyuav.experiment import resume, train, train_or_resume
+from hyuav.experiment import new_training, resume, train, train_or_resume
 from hyuav.interruption import Interruption
-from hyuav.learning.training import Training
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.tracking.checkpoints import first_checkpoint
 from killed_training import OFF, differences, outcome, small
@@ -79,12 +78,7 @@ def test_a_training_that_only_began_goes_on_from_its_initial_weights(
     tmp_path: Path, unbroken: Path
 ) -> None:
     configuration = every_episode(6)
-    start = Training(
-        configuration.scenario,
-        configuration.learners,
-        configuration.algorithm,
-        configuration.training,
-    )
+    start = new_training(configuration)
     run = RunDirectory.create(tmp_path / "run", configuration, None, first_checkpoint(start))
     resume(run.path, OFF, SILENT)
     assert differences(outcome(run.path), outcome(unbroken)) == []
@@ -173,12 +167,7 @@ def test_a_learner_without_finite_numbers_stops_and_the_others_do_not_notice(
 ) -> None:
     """Its critic begins with weights so large that the square of its loss is beyond a float."""
     configuration = every_episode(6)
-    weights = Training(
-        configuration.scenario,
-        configuration.learners,
-        configuration.algorithm,
-        configuration.training,
-    ).best_weights
+    weights = new_training(configuration).best_weights
     for name, values in weights.items():
         if "value_network" in name:
             values.select(-min(values.ndim, 3), 1).mul_(1e25)
@@ -237,12 +226,7 @@ def test_a_signal_that_is_ignored_stays_so() -> None:
 def test_pytorchs_own_generator_is_not_drawn_from(run: RunDirectory) -> None:
     """Which is why no checkpoint holds its state."""
     configuration = run.configuration()
-    training = Training(
-        configuration.scenario,
-        configuration.learners,
-        configuration.algorithm,
-        configuration.training,
-    )
+    training = new_training(configuration)
     before = torch.get_rng_state()
     list(training.episodes())
     assert torch.equal(torch.get_rng_state(), before)

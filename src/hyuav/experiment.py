@@ -63,7 +63,7 @@ def train(
         Interrupted: a signal asked to stop; :func:`resume` goes on.
         Halted: the training cannot go on.
     """
-    training = _training(configuration, device)
+    training = new_training(configuration, device)
     if initial_weights is not None:
         training.warm_start(initial_weights)
     run = RunDirectory(directory)
@@ -100,7 +100,7 @@ def resume(
     """
     run = RunDirectory(directory)
     configuration = run.configuration()
-    training = _training(configuration, device)
+    training = new_training(configuration, device)
     require_writable("run directory", run.path)
     with run.reserved():
         reported = restore(run, training)
@@ -180,7 +180,16 @@ def train_or_resume(
     )
 
 
-def _training(configuration: RunConfiguration, device: str | None) -> Training:
+def new_training(configuration: RunConfiguration, device: str | None = None) -> Training:
+    """The training that is configured, of which nothing is done yet.
+
+    Args:
+        configuration: of the training.
+        device: to train on.
+
+    Raises:
+        InputError: as :class:`hyuav.learning.training.Training`.
+    """
     return Training(
         configuration.scenario,
         configuration.learners,

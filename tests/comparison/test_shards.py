@@ -15,6 +15,7 @@ from hyuav.comparison.plan import PEER, parameters_of, training_episodes
 from hyuav.comparison.shards import Shard, tables
 from hyuav.errors import InputError
 from hyuav.evaluation import EvaluationParameters, Policy, fly
+from hyuav.experiment import new_training
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.runs import RunConfiguration, RunDirectory
@@ -149,7 +150,7 @@ def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: 
     whole.run()
     run = RunDirectory.create(tmp_path / "broken/ddpg_campus_T6.partial", broken.configuration)
     configuration = broken.configuration
-    training = Training(SCENARIO, LEARNERS, configuration.algorithm, TRAINING)
+    training = new_training(configuration)
     with Tracker(run, configuration, training, broken.logger, Console(quiet=True)) as tracker:
         for episode in training.episodes():
             tracker.log(episode)

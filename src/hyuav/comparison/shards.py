@@ -82,9 +82,7 @@ def _clear(directory: Path) -> None:
 
 def _begin(shard: Shard, directory: Path) -> RunDirectory:
     _clear(directory)
-    logs = shard.parent.parent  # which does not change its name
-    configuration = shard.configuration
-    return train(directory, configuration, _logger(shard), Console(quiet=True), logs=logs)
+    return train(directory, shard.configuration, *_reporting(shard), logs=_logs(shard))
 
 
 def _go_on(shard: Shard, directory: Path) -> RunDirectory | None:
@@ -93,7 +91,7 @@ def _go_on(shard: Shard, directory: Path) -> RunDirectory | None:
     try:
         if _comparable(run.configuration()) != _comparable(shard.configuration):
             return None
-        return resume(directory, _logger(shard), Console(quiet=True))
+        return resume(directory, *_reporting(shard), logs=_logs(shard))
     except InputError:  # no checkpoint yet, or one that cannot be read
         return None
 
@@ -104,10 +102,14 @@ def _comparable(configuration: RunConfiguration) -> RunConfiguration:
     return dataclasses.replace(configuration, training=training)
 
 
-def _logger(shard: Shard) -> LoggerParameters:
-    return dataclasses.replace(
-        in_group(shard.logger, shard.parent.parent), name=shard.name, id=None
-    )
+def _reporting(shard: Shard) -> tuple[LoggerParameters, Console]:
+    logger = dataclasses.replace(in_group(shard.logger, _logs(shard)), name=shard.name, id=None)
+    return logger, Console(quiet=True)
+
+
+def _logs(shard: Shard) -> Path:
+    """The comparison's directory, which does not change its name as the shard's does."""
+    return shard.parent.parent
 
 
 def _reached(shard: Shard, run: RunDirectory) -> tuple[pd.DataFrame, list[float]]:
