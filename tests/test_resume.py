@@ -6,6 +6,7 @@ import math
 import os
 import shutil
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -201,6 +202,15 @@ def test_a_training_halts_when_no_learner_is_left(tmp_path: Path) -> None:
     assert all(math.isfinite(loss) for loss in accumulated)
 
 
+@pytest.fixture
+def _not_ignored() -> Iterator[None]:
+    """Let SIGINT interrupt, which a shell's background process is made to ignore."""
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, former)
+
+
+@pytest.mark.usefixtures("_not_ignored")
 def test_the_first_signal_is_remembered_and_the_second_obeyed() -> None:
     with Interruption() as interruption:
         interruption.raise_if_requested("nothing yet")
