@@ -295,3 +295,20 @@ def test_bad_arguments_are_answered_in_one_line(arguments: dict[str, Any], field
     with pytest.raises(InputError, match=f"^{field} = ") as caught:
         make_env(**{"scenario": TWO_CLUSTERS, **arguments})
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("batch_size", [(), (3,)])
+@pytest.mark.parametrize("fading", [True, False])
+def test_the_fading_that_is_told_is_what_the_slot_was_earned_by(
+    batch_size: tuple[int, ...], fading: bool
+) -> None:
+    scenario = dataclasses.replace(TWO_CLUSTERS, fading=fading, helper_start=(-40.0, 0.0))
+    env = make_env(scenario, "relay", batch_size, seed=0, fading=True)
+    check_env_specs(env)
+    silent = make_env(scenario, "relay", batch_size, seed=0)
+    found = env.rollout(5)["next"]
+    assert found["fading"].shape == (*batch_size, 5, 3 * scenario.num_ues + 2)
+    rates, _ = env.base_env.system.sum_rates(found["position"], found["fading"])
+    torch.testing.assert_close(found["reward"].squeeze(-1), rates - 0.2 * found["off_map"][..., 0])
+    assert bool((found["fading"] == 1.0).all()) != fading
+    assert "fading" not in silent.reset()

@@ -50,6 +50,8 @@ class Slot(NamedTuple):
     jamming: ModeOutcome
     tasks: Tasks | None
     """None where neither the edge's admission nor diagnostics need them."""
+    fading: Tensor | None
+    """(..., 3 U + 2) powers, or None where fading is off."""
 
 
 def diagnose(

@@ -37,6 +37,8 @@ class SecureOffloadingEnv(EnvBase):
         - ``mode`` (1,) int64: 1 relay, 0 jamming; after a reset, the mode at the start position.
         - ``distances`` (U + 2,) float32, m: horizontal, to the UEs in order, then L, then E.
         - ``off_map`` (1,) bool: the last flight would have left the map and was turned back.
+        - ``fading`` (3 U + 2,) float32, only where asked for: the factors of unit mean by which the
+          slot's fading multiplied the path gains, of the U links to L, to H and to E, H-L and H-E.
         - ``diagnostics``, only where asked for, see :mod:`hyuav.envs.diagnostics`.
 
     Action:
@@ -61,6 +63,7 @@ class SecureOffloadingEnv(EnvBase):
             diagnostics are asked for. Or one for each row of the batch's first dimension, whose
             numbers then depend on its own seed alone: rows of equal seeds are equally lucky.
         diagnostics: compute the ``diagnostics`` entry too.
+        fading: give the ``fading`` entry too.
 
     Raises:
         InputError: (a ``ValueError``) an unknown preset, scheme or device, a negative seed.
@@ -80,11 +83,13 @@ class SecureOffloadingEnv(EnvBase):
         device: torch.device | str | None = None,
         seed: int | list[int] | tuple[int, ...] | None = None,
         diagnostics: bool = False,
+        fading: bool = False,
     ) -> None:
         super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
         self.system = SecureOffloadingSystem(as_scenario(scenario), self.device)
         self.schemes = as_schemes(scheme, self.batch_size)
         self.diagnostics = switch("diagnostics", diagnostics)
+        self.tells_fading = switch("fading", fading)
         self._always_relay = self._rows_that_fly("relay")
         self._always_jam = self._rows_that_fly("jamming")
         norm_limit = self.system.norm_limit(self.schemes)
@@ -127,6 +132,9 @@ class SecureOffloadingEnv(EnvBase):
             shape=batch,
             device=self.device,
         )
+        if self.tells_fading:
+            powers = (*batch, 3 * self.scenario.num_ues + 2)
+            self.observation_spec["fading"] = Unbounded(powers, dtype=torch.float32)
         if self.diagnostics:
             self.observation_spec["diagnostics"] = diagnostics_spec(
                 batch, self.scenario.num_ues, self.device
@@ -216,10 +224,10 @@ class SecureOffloadingEnv(EnvBase):
         jamming = self.system.jamming_outcome(gains, admission)
         relay_mode = prefers_relay(relay.sum_rate, jamming.sum_rate).unsqueeze(-1)
         relay_mode = (relay_mode | self._always_relay) & ~self._always_jam
-        return Slot(position, distances, relay_mode, relay, jamming, tasks)
+        return Slot(position, distances, relay_mode, relay, jamming, tasks, fading)
 
     def _observation(self, slot: Slot, off_map: Tensor) -> TensorDictBase:
-        return TensorDict(
+        observed = TensorDict(
             position=slot.position,
             mode=slot.relay_mode.to(torch.int64),
             distances=slot.distances,
@@ -227,3 +235,7 @@ class SecureOffloadingEnv(EnvBase):
             batch_size=self.batch_size,
             device=self.device,
         )
+        if self.tells_fading:
+            powers = self.observation_spec["fading"].one() if slot.fading is None else slot.fading
+            observed["fading"] = powers
+        return observed

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import torch
 from tensordict import TensorDictBase
+from torch import Tensor
 from torchrl.data import Composite, Unbounded
 from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
@@ -33,6 +34,19 @@ class OffMapPenalty(Transform):
         return next_tensordict
 
 
+def fenced(scenario: Scenario, position: Tensor, action: Tensor) -> Tensor:
+    """Bound each component of an action (..., 2) so that the flight ends on the map.
+
+    Args:
+        scenario: its map, speed limit and slot duration.
+        position: (..., 2) m, where the flight begins.
+        action: velocity in units of v_max.
+    """
+    reach = scenario.max_speed * scenario.slot_duration
+    edge = scenario.map_side / 2 * (1.0 - 1e-6)  # so that rounding leads nowhere else
+    return action.maximum((-edge - position) / reach).minimum((edge - position) / reach)
+
+
 class Geofence(Transform):
     """Slow the flight, component by component, so that it ends on the map.
 
@@ -46,15 +60,11 @@ class Geofence(Transform):
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(in_keys_inv=["action"], out_keys_inv=["action"])
-        self._reach = scenario.max_speed * scenario.slot_duration
-        self._edge = scenario.map_side / 2 * (1.0 - 1e-6)  # so that rounding leads nowhere else
+        self._scenario = scenario
 
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Bound the action that the environment takes; the learner's own stays as it is."""
-        position = tensordict["position"]
-        lowest = (-self._edge - position) / self._reach
-        highest = (self._edge - position) / self._reach
-        tensordict["action"] = tensordict["action"].maximum(lowest).minimum(highest)
+        tensordict["action"] = fenced(self._scenario, tensordict["position"], tensordict["action"])
         return tensordict
 
 
@@ -110,6 +120,7 @@ def make_env(
     seed: int | list[int] | tuple[int, ...] | None = None,
     diagnostics: bool = False,
     *,
+    fading: bool = False,
     clock: bool = False,
     geofence: bool = False,
     compiled: bool = False,
@@ -128,6 +139,7 @@ def make_env(
         device: of all tensors.
         seed: of fading and tasks, one for all or one per row.
         diagnostics: compute the ``diagnostics`` entry too.
+        fading: give the ``fading`` entry too.
         clock: append the slots flown to ``observation``, which then has U + 6 entries.
         geofence: slow flights so that they end on the map; see :class:`Geofence`.
         compiled: run each slot as one compiled graph, which takes half a minute in the first step
@@ -138,7 +150,7 @@ def make_env(
     """
     switch("clock", clock)
     switch("geofence", geofence)
-    env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics)
+    env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics, fading)
     kind = CompiledEnv if switch("compiled", compiled) else TransformedEnv
     return kind(
         env,
