@@ -3,6 +3,11 @@
 import torch
 from tensordict import TensorDict, TensorDictBase
 
+from hyuav import Scenario
+
+TEN_UES = Scenario.preset("two_clusters")
+"""Its observations have 15 entries."""
+
 
 def mini_batch(learners: int, size: int, observation_size: int = 15) -> TensorDictBase:
     """Transitions (learners, size) with the entries that the losses read."""

@@ -8,6 +8,7 @@ import pytest
 import torch
 from scipy import stats
 
+from batches import TEN_UES
 from hyuav import InputError, Scenario
 from hyuav.evaluation import (
     LABELS,
@@ -33,7 +34,7 @@ FEW = EvaluationParameters(episodes=40, flights=2, seed=5)
 @pytest.fixture(scope="module")
 def policies() -> dict[str, list[Policy]]:
     algorithm = DDPG(hidden_sizes=(8,))
-    weights = copy_weights(algorithm.build(2, 15).loss)
+    weights = copy_weights(algorithm.build(2, TEN_UES).loss)
     optima = solve(SCENARIO, resolution=2.0)
     return {
         "re_lt": [Policy(re_lt(SCENARIO))],
@@ -89,7 +90,7 @@ def test_all_learners_fly_through_the_same_fading() -> None:
 
 def test_a_learner_earns_among_others_what_it_earns_alone() -> None:
     algorithm = DDPG(hidden_sizes=(8,))
-    weights = copy_weights(algorithm.build(3, 15).loss)
+    weights = copy_weights(algorithm.build(3, TEN_UES).loss)
     among = Policy(LearnedPolicy(SCENARIO, algorithm, weights, [2, 0]), 2)
     alone = Policy(LearnedPolicy(SCENARIO, algorithm, weights, [0]))
     torch.testing.assert_close(

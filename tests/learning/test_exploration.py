@@ -2,6 +2,7 @@ import pytest
 import torch
 from tensordict import TensorDict, TensorDictBase
 
+from hyuav import Scenario
 from hyuav.learning.exploration import GaussianNoise, WarmUp
 
 
@@ -56,57 +57,56 @@ def test_noise_stays_above_its_floor() -> None:
     assert action.std().item() == pytest.approx(0.05, rel=0.03)
 
 
+SCENARIO = Scenario.preset("two_clusters")
+
+
 def fly(warm_up: WarmUp, learners: int, num_slots: int) -> torch.Tensor:
-    """The actions (slots, N, 2) of one episode in which the actor wants to stay."""
-    return torch.stack([warm_up(slot(learners, count))["action"] for count in range(num_slots)])
+    """Where an episode of learners whose actors want to stay leads: (slots, N, 2) m."""
+    position, flight = torch.tensor(SCENARIO.helper_start).expand(learners, 2), []
+    for count in range(num_slots):
+        seen = slot(learners, count).set("position", position)
+        position = (position + 20.0 * warm_up(seen)["action"]).clamp(-100.0, 100.0)
+        flight.append(position)
+    return torch.stack(flight)
 
 
 def test_a_warm_up_ends_after_its_episodes() -> None:
-    warm_up = WarmUp(3, episodes=2)
-    assert bool((fly(warm_up, 3, 5) != 0.0).all())
-    assert bool((fly(warm_up, 3, 5) != 0.0).all())
-    assert bool((fly(warm_up, 3, 5) == 0.0).all())
-
-
-def test_a_warm_up_hovers_and_sweeps() -> None:
     torch.manual_seed(0)
-    warm_up = WarmUp(100, episodes=60)
-    flights = torch.stack([fly(warm_up, 100, 20) for _ in range(60)])
-    assert flights.abs().max() == 1.0
-    distance = flights.sum(dim=1).norm(dim=-1)  # of each flight, in slots at full speed
-    assert distance.amin(dim=0).max() < 2.0
-    assert distance.amax(dim=0).min() > 8.0
-    roots = (flights[:, 0].norm(dim=-1) / 2.0**0.5).sqrt()
-    for own in roots.unbind(dim=1):
-        gentle = own[own < 0.8].sort().values  # of those that are not clipped
-        assert len(gentle) >= 20
-        assert gentle.diff().max() < 0.1
+    warm_up = WarmUp(3, 2, SCENARIO)
+    start = torch.tensor(SCENARIO.helper_start)
+    assert bool((fly(warm_up, 3, 5) != start).all())
+    assert bool((fly(warm_up, 3, 5) != start).all())
+    assert bool((fly(warm_up, 3, 5) == start).all())
 
 
-def test_every_warm_up_sets_out_in_every_direction() -> None:
+def test_a_warm_up_flies_somewhere_and_stays_there() -> None:
     torch.manual_seed(0)
-    warm_up = WarmUp(100, episodes=60)
-    begun = torch.stack([fly(warm_up, 100, 3)[0] for _ in range(60)])
-    for own in begun.unbind(dim=1):
-        corners = {tuple(row) for row in own[own.abs().amin(dim=-1) == 1.0].tolist()}
-        assert corners == {(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)}
+    warm_up = WarmUp(50, 40, SCENARIO)
+    for _ in range(40):
+        flight = fly(warm_up, 50, 20)
+        steps = flight.diff(dim=0).abs().amax(dim=-1)
+        assert steps.max() <= 20.0 + 1e-4
+        assert steps[10:].max() < 20.0  # at most eight slots of way, and then only noise
+        assert steps[10:].mean() < 5.0
+        assert bool((steps[10:] > 0.0).any())
 
 
-def test_warm_ups_set_out_in_orders_of_their_own() -> None:
+def test_every_warm_up_covers_the_map_and_its_corners() -> None:
     torch.manual_seed(0)
-    first = fly(WarmUp(4000, episodes=60), 4000, 1)[0]
+    warm_up = WarmUp(50, 100, SCENARIO)
+    reached = torch.stack([fly(warm_up, 50, 20)[-1] for _ in range(100)])
+    spots = torch.cartesian_prod(torch.arange(-100.0, 101.0, 20.0), torch.arange(-100.0, 101.0, 20))
+    nearest = torch.cdist(spots.expand(50, -1, 2), reached.transpose(0, 1)).amin(dim=-1)
+    assert nearest.max() < 30.0
+    corners = (spots.abs() == 100.0).all(dim=-1)
+    assert nearest[:, corners].median() < 10.0
+
+
+def test_warm_ups_go_in_orders_of_their_own() -> None:
+    torch.manual_seed(0)
+    first = fly(WarmUp(4000, 60, SCENARIO), 4000, 12)[-1]
     quadrants = [
         (first.sign() == torch.tensor(signs)).all(dim=-1).float().mean().item()
         for signs in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
     ]
     assert quadrants == pytest.approx([0.25] * 4, abs=0.03)
-
-
-def test_a_warm_up_keeps_its_heading() -> None:
-    torch.manual_seed(0)
-    warm_up = WarmUp(5000, episodes=30)
-    flights = torch.stack([fly(warm_up, 5000, 20) for _ in range(30)])
-    agreement = (flights[:, :-1].sign() == flights[:, 1:].sign()).float().mean()
-    assert agreement > 0.85
-    turned = (flights[:, 0].sign() != flights[:, -1].sign()).float().mean()
-    assert turned > 0.1  # but not for ever

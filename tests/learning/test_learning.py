@@ -22,7 +22,10 @@ EASY = dataclasses.replace(
 def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
     torch.set_num_threads(1)
     algorithm = ALGORITHMS[name](
-        hidden_sizes=(64, 64), actor_learning_rate=1e-3, critic_learning_rate=1e-3
+        hidden_sizes=(64, 64),
+        actor_learning_rate=1e-3,
+        critic_learning_rate=1e-3,
+        warm_up_episodes=20 if name.endswith("robust") else 0,
     )
     parameters = TrainingParameters(
         num_episodes=80, batch_size=64, evaluation_every=5, evaluation_episodes=1

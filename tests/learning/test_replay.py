@@ -8,6 +8,7 @@ from hyuav.learning.replay import (
     TRANSITION,
     Memory,
     favouring_recent,
+    latest,
     make_replay,
     sampled_slots,
 )
@@ -96,7 +97,8 @@ def finish(memory: Memory, capacity: int, episodes: int, num_slots: int) -> Repl
     for _ in range(episodes):
         for slot in range(num_slots):
             replay.extend(memory.transition(transition(2, slot)).unsqueeze(0))
-        memory.finish_episode(replay, num_slots)
+        rewards = replay.storage._storage["next", "reward"][latest(replay, num_slots)]
+        memory.finish_episode(replay, rewards)
     return replay
 
 

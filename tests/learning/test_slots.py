@@ -56,7 +56,9 @@ def tensors(trained: Cohort) -> dict[str, torch.Tensor]:
     carrier = trained.collector._carrier
     found |= {f"carrier.{key}": carrier[key] for key in ("observation", "mode", "step_count")}
     return {
-        name: values.clone() for name, values in found.items() if isinstance(values, torch.Tensor)
+        name: values.clone().nan_to_num()  # NaN where no flight is planned
+        for name, values in found.items()
+        if isinstance(values, torch.Tensor)
     }
 
 

@@ -6,7 +6,7 @@ import pytest
 import torch
 from tensordict import TensorDictBase
 
-from batches import mini_batch
+from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithms import ALGORITHMS, Algorithm
 from hyuav.learning.replay import RETURN
 from hyuav.randomness import given_normals
@@ -16,7 +16,9 @@ NAMES = ["ddpg", "td3", "sac"]
 
 def built(name: str, bound: float) -> Algorithm:
     torch.manual_seed(0)
-    return ALGORITHMS[name](hidden_sizes=(8,), return_bound=bound, discount=0.9).build(2, 15)
+    return ALGORITHMS[name](clock=False, hidden_sizes=(8,), return_bound=bound, discount=0.9).build(
+        2, TEN_UES
+    )
 
 
 def target(name: str, bound: float, batch: TensorDictBase) -> torch.Tensor:
@@ -64,9 +66,10 @@ def test_an_update_with_returns_not_known_yet_is_finite(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_trust_in_returns_fades(name: str) -> None:
-    algorithm = ALGORITHMS[name](hidden_sizes=(8,), return_bound=0.8, return_bound_decay=0.5).build(
-        2, 15
+    parameters = ALGORITHMS[name](
+        clock=False, hidden_sizes=(8,), return_bound=0.8, return_bound_decay=0.5
     )
+    algorithm = parameters.build(2, TEN_UES)
     batch = mini_batch(2, 5)
     batch[RETURN] = torch.full((2, 5, 1), -torch.inf)
     for update in range(1, 4):

@@ -1,7 +1,10 @@
+import dataclasses
+
 import pytest
 import torch
 from tensordict import TensorDict
 
+from batches import TEN_UES
 from hyuav.errors import InputError
 from hyuav.learning.algorithms import ALGORITHMS, DDPG
 from hyuav.learning.weights import (
@@ -15,11 +18,13 @@ from hyuav.learning.weights import (
     select_learner,
 )
 
+NINE_UES = dataclasses.replace(TEN_UES, ue_positions=TEN_UES.ue_positions[1:])
+
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_a_selected_learner_acts_as_it_does_among_others(name: str) -> None:
-    many = ALGORITHMS[name](hidden_sizes=(8,)).build(3, 15)
-    one = ALGORITHMS[name](hidden_sizes=(8,)).build(1, 15)
+    many = ALGORITHMS[name](clock=False, hidden_sizes=(8,)).build(3, TEN_UES)
+    one = ALGORITHMS[name](clock=False, hidden_sizes=(8,)).build(1, TEN_UES)
     load_weights(one.loss, select_learner(copy_weights(many.loss), 1))
     data = TensorDict(observation=torch.randn(3, 6, 15), batch_size=[3, 6])
     expected = many.actor(data.clone())["action"][1:2]
@@ -28,7 +33,7 @@ def test_a_selected_learner_acts_as_it_does_among_others(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_only_the_named_learners_are_replaced(name: str) -> None:
-    algorithm = ALGORITHMS[name](hidden_sizes=(8,)).build(3, 15)
+    algorithm = ALGORITHMS[name](clock=False, hidden_sizes=(8,)).build(3, TEN_UES)
     weights = copy_weights(algorithm.loss)
     replace_learners(
         weights,
@@ -44,7 +49,7 @@ def test_only_the_named_learners_are_replaced(name: str) -> None:
 
 
 def test_one_learners_weights_serve_all() -> None:
-    one, many = DDPG(hidden_sizes=(8,)).build(1, 15), DDPG(hidden_sizes=(8,)).build(3, 15)
+    one, many = DDPG(hidden_sizes=(8,)).build(1, TEN_UES), DDPG(hidden_sizes=(8,)).build(3, TEN_UES)
     load_weights(many.loss, copy_weights(one.loss))
     data = TensorDict(observation=torch.randn(1, 15).expand(3, 15), batch_size=[3])
     actions = many.actor(data)["action"]
@@ -54,16 +59,16 @@ def test_one_learners_weights_serve_all() -> None:
 @pytest.mark.parametrize(
     "other",
     [
-        DDPG(hidden_sizes=(9,)).build(2, 15),
-        DDPG(hidden_sizes=(8,)).build(3, 15),
-        DDPG(hidden_sizes=(8,)).build(2, 16),
-        DDPG(hidden_sizes=(8, 8)).build(2, 15),
-        ALGORITHMS["sac"](hidden_sizes=(8,)).build(2, 15),
+        DDPG(hidden_sizes=(9,)).build(2, TEN_UES),
+        DDPG(hidden_sizes=(8,)).build(3, TEN_UES),
+        DDPG(hidden_sizes=(8,)).build(2, NINE_UES),
+        DDPG(hidden_sizes=(8, 8)).build(2, TEN_UES),
+        ALGORITHMS["sac"](hidden_sizes=(8,)).build(2, TEN_UES),
     ],
     ids=["width", "learners", "observation", "depth", "algorithm"],
 )
 def test_other_networks_weights_are_refused_and_change_nothing(other: object) -> None:
-    algorithm = DDPG(hidden_sizes=(8,)).build(2, 15)
+    algorithm = DDPG(hidden_sizes=(8,)).build(2, TEN_UES)
     before = copy_weights(algorithm.loss)
     with pytest.raises(InputError, match=r"^checkpoint: [^\n]*$"):
         load_weights(algorithm.loss, copy_weights(other.loss))  # type: ignore[attr-defined]
@@ -73,10 +78,10 @@ def test_other_networks_weights_are_refused_and_change_nothing(other: object) ->
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_initial_weights_are_a_learners_own_and_follow_pytorchs_law(name: str) -> None:
-    many = ALGORITHMS[name](hidden_sizes=(300, 100)).build(3, 15)
-    one = ALGORITHMS[name](hidden_sizes=(300, 100)).build(1, 15)
-    draw_weights(many.loss, [4, 7, 5])
-    draw_weights(one.loss, [7])
+    many = ALGORITHMS[name](clock=False, hidden_sizes=(300, 100)).build(3, TEN_UES)
+    one = ALGORITHMS[name](clock=False, hidden_sizes=(300, 100)).build(1, TEN_UES)
+    draw_weights(many.loss, [4, 7, 5], "weights")
+    draw_weights(one.loss, [7], "weights")
     weights, alone = copy_weights(many.loss), copy_weights(one.loss)
     selected = select_learner(weights, 1)
     assert all(torch.equal(alone[key], selected[key]) for key in alone)
@@ -89,12 +94,12 @@ def test_initial_weights_are_a_learners_own_and_follow_pytorchs_law(name: str) -
         if key.startswith("target_"):
             assert torch.equal(values, weights[key.removeprefix("target_")])
     if not name.startswith("ddpg"):
-        critics = weights["qvalue_network_params.module.layers.0.weight"]
+        critics = next(v for k, v in weights.items() if k.startswith("qvalue") and "0.weight" in k)
         assert not torch.equal(critics[0], critics[1])
 
 
 def test_joined_learners_are_counted_and_selected_again() -> None:
-    several = [copy_weights(DDPG(hidden_sizes=(8,)).build(n, 15).loss) for n in (1, 2)]
+    several = [copy_weights(DDPG(hidden_sizes=(8,)).build(n, TEN_UES).loss) for n in (1, 2)]
     joined = join_learners(several)
     assert [count_learners(each) for each in (*several, joined)] == [1, 2, 3]
     last = select_learner(joined, 2)
@@ -103,7 +108,7 @@ def test_joined_learners_are_counted_and_selected_again() -> None:
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_restored_actors_act_as_before_and_critics_stay(name: str) -> None:
-    algorithm = ALGORITHMS[name](hidden_sizes=(8,)).build(3, 15)
+    algorithm = ALGORITHMS[name](clock=False, hidden_sizes=(8,)).build(3, TEN_UES)
     data = TensorDict(observation=torch.randn(3, 6, 15), batch_size=[3, 6])
     before, weights = algorithm.actor(data.clone())["action"], copy_weights(algorithm.loss)
     with torch.no_grad():

@@ -26,8 +26,8 @@ class FiveSchemes:
         torch.set_num_threads(work.threads)
         self.work, scenario = work, work.scenario
         algorithm = DDPG(hidden_sizes=work.hidden_sizes)
-        loss = algorithm.build(1, work.observation_size).loss
-        draw_weights(loss, [work.seed])
+        loss = algorithm.build(1, scenario).loss
+        draw_weights(loss, [work.seed], "weights")
         actor = LearnedPolicy(scenario, algorithm, copy_weights(loss), [0])
         self.policies = {name: [Policy(actor)] for name in LEARNED.values()} | {
             name: [Policy(make(scenario))] for name, make in LINEAR.items()

@@ -12,8 +12,8 @@ from torchrl.collectors import Collector
 
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.repetition import BestFlights, as_planned
-from hyuav.learning.replay import clear_unused, favouring_recent, forget, make_replay
+from hyuav.learning.repetition import as_planned
+from hyuav.learning.replay import clear_unused, favouring_recent, forget, latest, make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import (
     copy_weights,
@@ -77,14 +77,16 @@ class Cohort:
     ) -> None:
         self.scenario, self.learners = scenario, tuple(learners)
         self._options = {"clock": algorithm.clock, "geofence": algorithm.geofence}
+        learning = {**self._options, "fading": algorithm.control_variate}
         self.batch_size = batch_size
         seeds = [learner.seed for learner in learners]
         schemes = [learner.scheme for learner in learners]
-        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, **self._options)
-        observation_size = self.env.observation_spec["observation"].shape[-1]
+        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, **learning)
         with self.env.device:
-            self.algorithm = algorithm.build(len(seeds), observation_size)
-        draw_weights(self.algorithm.loss, seeds)
+            self.algorithm = algorithm.assemble(len(seeds), scenario)
+        draw_weights(self.algorithm.loss, seeds, "weights")
+        if self.algorithm.control_variate is not None:
+            draw_weights(self.algorithm.control_variate, seeds, "control variate")
         self._streams = self._random_streams(seeds)
         self.replay = make_replay(
             replay_size,
@@ -93,7 +95,6 @@ class Cohort:
             self.env.device,
             by_age=algorithm.recency > 1.0,
         )
-        self.best_flights = BestFlights(len(seeds), scenario.num_slots, self.env.device)
         self.episode = self.updates = 0
         self.collector = Collector(
             self.env,
@@ -132,7 +133,7 @@ class Cohort:
 
     def _plan(self) -> Tensor:
         """Actions (T, N, 2) that are taken whatever the explorer says, NaN where there are none."""
-        planned = self.best_flights.actions
+        planned = self.algorithm.best_flights.actions
         return planned if self.algorithm.repeats(self.episode) else planned * torch.nan
 
     def _favour(self, uniform: Tensor) -> Tensor:
@@ -177,11 +178,18 @@ class Cohort:
         self.episode += 1
         self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
-        self.algorithm.parameters.memory.finish_episode(self.replay, self.scenario.num_slots)
-        if self.algorithm.parameters.repeat_every:
-            self.best_flights.keep(flown[0], self.replay)
+        self._remember()
         self._stop_where_not_finite(*flown)
         return flown
+
+    def _remember(self) -> None:
+        """What the episode brought, less its luck where that is known."""
+        slots = latest(self.replay, self.scenario.num_slots)
+        episode = self.replay.storage._storage[slots].transpose(0, 1)
+        rewards = self.algorithm.fair(episode)["next", "reward"].transpose(0, 1)
+        self.algorithm.parameters.memory.finish_episode(self.replay, rewards)
+        if self.algorithm.parameters.keeps_flights:
+            self.algorithm.best_flights.keep(rewards.sum(dim=(0, 2)), self.replay)
 
     def _stop_where_not_finite(self, reward: Tensor, losses: dict[str, Tensor]) -> None:
         finite = finite_learners(self.algorithm.loss) & reward.isfinite()
@@ -284,7 +292,6 @@ class Cohort:
             "random": {name: stream.state() for name, stream in self._streams.items()},
             "episode": self.episode,
             "updates": self.updates,
-            "best_flights": self.best_flights.state(),
             "best_evaluation": self.best_evaluation,
             "best_weights": self.best_weights,
             "stopped": self.stopped,
@@ -302,7 +309,6 @@ class Cohort:
         for name, stream in self._streams.items():
             stream.set_state(state["random"][name])
         self.episode, self.updates = state["episode"], state["updates"]
-        self.best_flights.set_state(state["best_flights"])
         self.best_evaluation = state["best_evaluation"].to(self.env.device)
         self.stopped = state["stopped"].to(self.env.device)
         self.best_weights = {

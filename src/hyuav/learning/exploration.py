@@ -1,13 +1,17 @@
 """The noise that Algorithm 1 adds to the actor's action, and what may come before it."""
 
-import math
-
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
-PERSISTENCE, LARGEST_VIGOUR = 0.97, 4.0
-"""Correlation of a warm-up's consecutive actions, and their size before they are clipped."""
+from hyuav.scenario import Scenario
+
+BEYOND = 1.25
+"""Where a warm-up's destinations are drawn, in units of the map; those beyond it are brought to
+its edge."""
+
+JITTER = 0.1
+"""Standard deviation of a warm-up's noise, in units of v_max."""
 
 EVENLY = (0.7548776662466927, 0.5698402909980532)
 """Multiples of both fill the unit square evenly (Roberts, "The unreasonable effectiveness of
@@ -54,44 +58,41 @@ class GaussianNoise(TensorDictModuleBase):
 
 
 class WarmUp(TensorDictModuleBase):
-    """Fly at random for some episodes, whatever ``action`` says: hovering, roaming or sweeping.
+    """Fly to places all over the map and stay there, for some episodes, whatever ``action`` says.
 
-    An action is an autoregressive Gaussian process of unit variance times the episode's vigour,
-    and clipped. The direction in which an episode begins and the root of its vigour, up to
-    :data:`LARGEST_VIGOUR`, fill their ranges evenly from episode to episode: at the least vigour
-    the helper stays about the start, at the most it crosses the map at full speed. Each learner
-    draws where in this sequence it begins, so that the directions cover the circle whatever the
-    seed, and in an order of its own. Independent actions would only tremble about the start.
+    The best flights go somewhere and hover. Noise about an actor never leaves the start's
+    surroundings, where a far region takes many slots in one direction and little is earned on the
+    way. From episode to episode the destinations fill the map evenly, and its edges more densely;
+    each learner draws where in their sequence it begins, so that they cover the map whatever the
+    seed, and in an order of its own. A little noise shows what is beside the way.
 
     Args:
         learners: N; each flies its own way.
         episodes: to fly so.
+        scenario: its map and speed.
     """
 
-    in_keys = ("action", "step_count")
+    in_keys = ("action", "step_count", "position")
     out_keys = ("action",)
 
-    def __init__(self, learners: int, episodes: int) -> None:
+    def __init__(self, learners: int, episodes: int, scenario: Scenario) -> None:
         super().__init__()
-        self._episodes = episodes
-        self.register_buffer("heading", torch.zeros(learners, 2))
+        self._episodes, self._half_side = episodes, scenario.map_side / 2
+        self._reach = scenario.max_speed * scenario.slot_duration
         self.register_buffer("origin", torch.zeros(learners, 2))
         self.register_buffer("episode", torch.zeros(learners, 1))
         self.register_buffer("multiples", torch.tensor(EVENLY), persistent=False)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Read ``action`` (N, 2) and ``step_count`` (N, 1), write the ``action`` to take."""
+        """Read ``action`` (N, 2), ``step_count`` (N, 1) and ``position`` (N, 2) m; act."""
         action, begins = tensordict["action"], tensordict["step_count"] == 0
         normal = torch.randn_like(action)
         anywhere = torch.special.ndtr(normal)
         self.origin.copy_(torch.where(begins & (self.episode == 0), anywhere, self.origin))
         self.episode.add_(begins)
-        turned = PERSISTENCE * self.heading + (1.0 - PERSISTENCE**2) ** 0.5 * normal
-        share, part = torch.frac(self.origin + self.episode * self.multiples).split(1, dim=-1)
-        angle = 2.0 * math.pi * part
-        begun = math.sqrt(2.0) * torch.cat([angle.cos(), angle.sin()], dim=-1)
-        self.heading.copy_(torch.where(begins, begun, turned))
-        vigour = LARGEST_VIGOUR * share.square()
-        roaming = (vigour * self.heading).clamp(-1.0, 1.0)
-        tensordict["action"] = torch.where(self.episode > self._episodes, action, roaming)
+        share = torch.frac(self.origin + self.episode * self.multiples)
+        destination = ((2.0 * share - 1.0) * BEYOND).clamp(-1.0, 1.0) * self._half_side
+        towards = (destination - tensordict["position"]) / self._reach
+        flown = (towards + JITTER * normal).clamp(-1.0, 1.0)
+        tensordict["action"] = torch.where(self.episode > self._episodes, action, flown)
         return tensordict

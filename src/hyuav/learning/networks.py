@@ -8,6 +8,8 @@ import torch
 from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
 
+from hyuav.learning.afterstate import Afterstate
+
 ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
 
@@ -107,6 +109,24 @@ class StretchedTanh(nn.Module):
         return (self.stretch * inputs.tanh()).clamp(-1.0, 1.0)
 
 
+class AfterstateCritic(nn.Module):
+    """Q(s, a) by what (s, a) leads to.
+
+    Args:
+        afterstate: of the scenario.
+        network: maps its features to values.
+    """
+
+    def __init__(self, afterstate: Afterstate, network: LearnerMLP) -> None:
+        super().__init__()
+        self.afterstate, self.network = afterstate, network
+
+    def forward(self, observation: Tensor, action: Tensor) -> Tensor:
+        """Map observations (N, ..., U + 5) and actions (N, ..., 2) to values (N, ..., 1)."""
+        values: Tensor = self.network(self.afterstate(observation, action))
+        return values
+
+
 def make_critic(
     learners: int,
     observation_size: int,
@@ -114,16 +134,17 @@ def make_critic(
     activation: str,
     *,
     layer_norm: bool = False,
+    afterstate: Afterstate | None = None,
 ) -> TensorDictModule:
     """Q(s, a) of N learners.
 
     Reads ``observation`` (N, ..., U + 5) and ``action`` (N, ..., 2), writes
-    ``state_action_value`` (N, ..., 1).
+    ``state_action_value`` (N, ..., 1). With an afterstate, its features are what the networks see.
     """
+    inputs = observation_size + 2 if afterstate is None else afterstate.size
+    network = LearnerMLP(learners, inputs, hidden_sizes, 1, activation, layer_norm=layer_norm)
     return TensorDictModule(
-        LearnerMLP(
-            learners, observation_size + 2, hidden_sizes, 1, activation, layer_norm=layer_norm
-        ),
+        network if afterstate is None else AfterstateCritic(afterstate, network),
         in_keys=["observation", "action"],
         out_keys=["state_action_value"],
     )

@@ -1,11 +1,12 @@
-"""The best flight so far of each learner, to be flown again."""
-
-from typing import Any
+"""The best flight so far of each learner, to be flown again and to be followed."""
 
 import torch
 from tensordict import TensorDictBase
-from torch import Tensor
+from torch import Tensor, nn
 from torchrl.data import ReplayBuffer
+
+from hyuav.learning.replay import latest
+from hyuav.scenario import Scenario
 
 
 def as_planned(tensordict: TensorDictBase, planned: Tensor) -> TensorDictBase:
@@ -14,7 +15,7 @@ def as_planned(tensordict: TensorDictBase, planned: Tensor) -> TensorDictBase:
     return tensordict
 
 
-class BestFlights:
+class BestFlights(nn.Module):
     """What each learner did in the episode in which it earned most.
 
     The helper moves as it is told, so that the same actions lead it the same way, through other
@@ -24,34 +25,50 @@ class BestFlights:
 
     Args:
         learners: N.
-        num_slots: T.
-        device: of all tensors.
+        scenario: that they fly.
     """
 
-    def __init__(self, learners: int, num_slots: int, device: torch.device | None) -> None:
-        self.reward = torch.full((learners,), -torch.inf, device=device)
-        self.actions = torch.full((num_slots, learners, 2), torch.nan, device=device)
+    reward: Tensor
+    """(N,), what each earned; minus infinity before the first."""
+    actions: Tensor
+    """(T, N, 2)."""
+    positions: Tensor
+    """(T, N, 2), where each was after each slot, in units of half the map's side."""
+
+    def __init__(self, learners: int, scenario: Scenario) -> None:
+        super().__init__()
+        shape = scenario.num_slots, learners, 2
+        self._slots_per_unit = scenario.num_slots / 2
+        self._reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
+        self.register_buffer("reward", torch.full((learners,), -torch.inf))
+        self.register_buffer("actions", torch.full(shape, torch.nan))
+        self.register_buffer("positions", torch.full(shape, torch.nan))
 
     def keep(self, reward: Tensor, replay: ReplayBuffer) -> None:
         """Keep the flight whose slots were stored last where it earned more than any before.
 
         Args:
-            reward: (N,) bps/Hz that it earned.
+            reward: (N,) that it earned.
             replay: of capacity T at least.
         """
-        count = len(self.actions)
-        first = replay.writer._cursor - count
-        slots = torch.arange(first, first + count) % replay.storage.max_size
+        flown = replay.storage._storage[latest(replay, len(self.actions))]
         better = reward > self.reward
-        flown = replay.storage._storage["action"][slots]
-        self.actions = torch.where(better.unsqueeze(-1), flown, self.actions)
-        self.reward = torch.where(better, reward, self.reward)
+        self.reward.copy_(torch.where(better, reward, self.reward))
+        where = better.unsqueeze(-1)
+        self.actions.copy_(torch.where(where, flown["action"], self.actions))
+        positions = flown["next", "observation"][..., :2]
+        self.positions.copy_(torch.where(where, positions, self.positions))
 
-    def state(self) -> dict[str, Tensor]:
-        """Everything that evolves."""
-        return {"reward": self.reward, "actions": self.actions}
+    def towards(self, observation: Tensor) -> Tensor:
+        """Actions (N, K, 2) that join the best flights by the next slot, or as soon as possible.
 
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go on from where :meth:`state` was taken."""
-        self.reward = state["reward"].to(self.reward.device)
-        self.actions = state["actions"].to(self.actions.device)
+        Before there is one, they hover.
+
+        Args:
+            observation: (N, K, U + 6), with a clock.
+        """
+        flown = ((observation[..., -1] + 1.0) * self._slots_per_unit).round().long()
+        slot = flown.clamp(max=len(self.positions) - 1).unsqueeze(-1).expand(*flown.shape, 2)
+        position = torch.take_along_dim(self.positions.transpose(0, 1), slot, dim=1)
+        action = (position - observation[..., :2]) / self._reach
+        return action.clamp(-1.0, 1.0).nan_to_num(0.0)

@@ -20,6 +20,8 @@ TRANSITION: tuple[NestedKey, ...] = (
 )
 """What a mini-batch consists of: (s_t, a_t, r_t, s_{t+1}) and whether the episode ended."""
 
+FADING: NestedKey = ("next", "fading")
+
 RETURN: NestedKey = ("next", "return")
 
 
@@ -97,6 +99,16 @@ def make_replay(
     )
 
 
+def latest(replay: ReplayBuffer, count: int) -> Tensor:
+    """Where in the storage the slots are that were stored last, the oldest first: (count,) int64.
+
+    They are fewer where the storage is smaller.
+    """
+    capacity = replay.storage.max_size
+    ages = torch.arange(min(count, capacity), 0, -1)
+    return (replay.writer._cursor - ages) % capacity
+
+
 def clear_unused(replay: ReplayBuffer) -> None:
     """Overwrite by zeros what no transition has been stored in: it is whatever was in memory."""
     if len(replay):
@@ -122,15 +134,18 @@ class Memory:
     """The last slot of an episode ends the return, which otherwise goes on past it."""
     returns: bool = False
     """Keep ``("next", "return")`` too: what the episode brought from this slot on."""
+    fading: bool = False
+    """Keep the slot's fading powers too."""
 
     @property
     def names(self) -> tuple[NestedKey, ...]:
         """The entries of a transition."""
-        return (*TRANSITION, RETURN) if self.returns else TRANSITION
+        fading = (FADING,) if self.fading else ()
+        return (*TRANSITION, *fading, *((RETURN,) if self.returns else ()))
 
     def transition(self, slot: TensorDictBase) -> TensorDictBase:
         """What is kept of a collected slot (N,); its return is not known yet."""
-        kept = slot.select(*TRANSITION)
+        kept = slot.select(*TRANSITION, *((FADING,) if self.fading else ()))
         if self.reward_scale != 1.0:
             kept["next", "reward"] = kept["next", "reward"] * self.reward_scale
         if self.finite_horizon:
@@ -139,14 +154,18 @@ class Memory:
             kept[RETURN] = torch.full_like(kept["next", "reward"], -torch.inf)
         return kept
 
-    def finish_episode(self, replay: ReplayBuffer, num_slots: int) -> None:
-        """Fill in the returns of the episode whose slots were stored last."""
+    def finish_episode(self, replay: ReplayBuffer, rewards: Tensor) -> None:
+        """Fill in the returns of an episode.
+
+        Args:
+            replay: where its slots were stored last.
+            rewards: (slots, N, 1), of all that are still there, to be counted.
+        """
         if not self.returns:
             return
-        storage, capacity = replay.storage, replay.storage.max_size
-        reward, returned = storage._storage["next", "reward"], storage._storage[RETURN]
-        following = torch.zeros_like(reward[0])
-        for ago in range(min(num_slots, capacity)):
-            slot = (replay.writer._cursor - 1 - ago) % capacity
-            following = reward[slot] + self.discount * following
+        returned = replay.storage._storage[RETURN]
+        following = torch.zeros_like(rewards[0])
+        slots = latest(replay, len(rewards)).tolist()
+        for slot, reward in zip(reversed(slots), rewards.flip(0), strict=True):
+            following = reward + self.discount * following
             returned[slot] = following

@@ -164,7 +164,8 @@ class CompiledSlots:
         self._go_on(flown)
         normals = given["losses"].unbind(dim=1) if "losses" in given else ()
         with given_normals(iter(normals)):
-            self._update(self._sample(given["sampling"]), taken, given["corrections"])
+            batch = self._algorithm.fair(self._sample(given["sampling"]))
+            self._update(batch, taken, given["corrections"])
         self._totals["reward"].add_(flown["next", "reward"].squeeze(-1))
 
     def _fly_slot(self, given: Mapping[str, Tensor]) -> TensorDictBase:

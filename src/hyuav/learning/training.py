@@ -119,8 +119,8 @@ class Training:
         on_cpu = as_device(device).type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
         longest = max(self.horizons)
-        if algorithm.repeat_every and parameters.replay_size < longest:
-            accepted = f"at least the {longest} slots of a flight, for repeat_every"
+        if algorithm.keeps_flights and parameters.replay_size < longest:
+            accepted = f"at least the {longest} slots of a flight, to keep the best"
             raise InputError(rejection("replay_size", parameters.replay_size, accepted))
         require_memory(
             scenario.num_ues, self.horizons, algorithm, parameters.sizes, as_device(device)

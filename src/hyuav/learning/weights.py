@@ -7,7 +7,7 @@ add one axis in front), and a learner's temperature has it in front of one more 
 from collections.abc import Sequence
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torchrl.objectives import LossModule
 
 from hyuav.errors import InputError, brief
@@ -18,17 +18,18 @@ def _learner_axis(weights: Tensor) -> int:
     return -min(weights.ndim, 3)
 
 
-def draw_weights(loss: LossModule, seeds: Sequence[int]) -> None:
+def draw_weights(module: nn.Module, seeds: Sequence[int], stream: str) -> None:
     """Draw each learner's initial weights from its own seed, as PyTorch's linear layers are.
 
     Targets begin as copies. A learner's temperature is left as it is.
 
     Args:
-        loss: holding the networks of N learners.
+        module: holding the networks of N learners.
         seeds: of the N learners.
+        stream: which of each seed's random numbers to use.
     """
-    generators = [torch.Generator().manual_seed(derived_seed(seed, "weights")) for seed in seeds]
-    networks = dict(loss.named_parameters())
+    generators = [torch.Generator().manual_seed(derived_seed(seed, stream)) for seed in seeds]
+    networks = dict(module.named_parameters())
     for name, values in networks.items():
         layer, _, kind = name.rpartition(".")
         if kind not in ("weight", "bias"):
@@ -37,7 +38,7 @@ def draw_weights(loss: LossModule, seeds: Sequence[int]) -> None:
         for learner, generator in enumerate(generators):
             own = values.data.select(-3, learner)
             own.copy_(torch.empty(own.shape).uniform_(-bound, bound, generator=generator))
-    for name, target in loss.named_buffers():
+    for name, target in module.named_buffers():
         if name.startswith("target_"):
             target.copy_(networks[name.removeprefix("target_")].data)
 

@@ -39,7 +39,7 @@ class LearnedPolicy(TensorDictModuleBase):
         super().__init__()
         self._several = not isinstance(learner, int)
         learners = [learner] if isinstance(learner, int) else learner
-        built = algorithm.build(len(learners), scenario.num_ues + 5 + algorithm.clock)
+        built = algorithm.build(len(learners), scenario)
         load_weights(built.loss, join_learners([select_learner(weights, i) for i in learners]))
         self.actor = built.actor
 

@@ -7,7 +7,7 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
-from batches import mini_batch
+from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithms import ALGORITHMS, Algorithm
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
 
@@ -15,7 +15,7 @@ NAMES = sorted(ALGORITHMS)
 
 
 def build(name: str, learners: int) -> Algorithm:
-    return ALGORITHMS[name](hidden_sizes=(12, 8)).build(learners, 15)
+    return ALGORITHMS[name](clock=False, hidden_sizes=(12, 8)).build(learners, TEN_UES)
 
 
 def train(algorithm: Algorithm, disturbance: float) -> dict[str, Tensor]:

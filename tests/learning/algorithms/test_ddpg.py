@@ -7,9 +7,10 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from batches import mini_batch
+from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithms import DDPG, TD3, Algorithm
-from hyuav.learning.algorithms.ddpg import CLEARLY, UNSATURATED, alternatives, saturation
+from hyuav.learning.algorithms.ddpg import CLEARLY, UNSATURATED, saturation
+from hyuav.learning.repetition import BestFlights
 from hyuav.learning.replay import RETURN
 from hyuav.randomness import given_normals
 
@@ -31,7 +32,7 @@ def plain(weights: dict[str, Tensor], prefix: str, learner: int, *, squash: bool
 def test_an_update_is_the_papers_for_every_learner() -> None:
     torch.manual_seed(0)
     hyperparameters = DDPG(hidden_sizes=(12, 8, 8), actor_learning_rate=1e-3)
-    algorithm = hyperparameters.build(2, 15)
+    algorithm = hyperparameters.build(2, TEN_UES)
     start = copy.deepcopy(algorithm.loss.state_dict())
     batch = mini_batch(2, 70)
     algorithm.update_networks(batch.clone(), 1)
@@ -75,7 +76,7 @@ def test_an_update_is_the_papers_for_every_learner() -> None:
 
 
 def test_targets_begin_as_copies_of_the_networks() -> None:
-    state = DDPG(hidden_sizes=(4,)).build(2, 15).loss.state_dict()
+    state = DDPG(hidden_sizes=(4,)).build(2, TEN_UES).loss.state_dict()
     for name in ("actor_network_params", "value_network_params"):
         for key in [key for key in state if key.startswith(name)]:
             assert torch.equal(state[key], state[f"target_{key}"])
@@ -108,12 +109,14 @@ def test_the_defaults_are_the_papers() -> None:
         "recency": 1.0,
         "return_bound": 0.0,
         "return_bound_decay": 1.0,
+        "control_variate": False,
+        "afterstate": False,
         "noise_floor": 0.0,
     }
 
 
 def test_an_actor_is_saturated_beyond_a_bound() -> None:
-    loss, batch = DDPG(hidden_sizes=(8,)).build(2, 15).loss, mini_batch(2, 5)
+    loss, batch = DDPG(hidden_sizes=(8,)).build(2, TEN_UES).loss, mini_batch(2, 5)
     last = loss.actor_network_params["module", "layers", "2", "bias"].data
     assert not saturation(loss, batch).any()
     last.copy_(torch.tensor([[[0.0, 3.0]], [[-100.0, 3.0]]]) + UNSATURATED)
@@ -126,7 +129,7 @@ def test_an_actor_is_saturated_beyond_a_bound() -> None:
 @pytest.mark.parametrize("kind", [DDPG, TD3])
 def test_a_saturated_actor_is_drawn_back(kind: type[DDPG]) -> None:
     torch.manual_seed(0)
-    algorithm = kind(hidden_sizes=(8,), saturation_penalty=1.0).build(2, 15)
+    algorithm = kind(clock=False, hidden_sizes=(8,), saturation_penalty=1.0).build(2, TEN_UES)
     bias = algorithm.loss.actor_network_params["module", "layers", "2", "bias"].data
     bias.fill_(9.0)
     for index in range(1, 5):
@@ -140,7 +143,7 @@ def flying_along_x(kind: type[DDPG], weight: float, slope: float) -> Algorithm:
     Of their hidden units all but the first are cut off, so that they hold that flying at the
     speed v along x is worth slope * v.
     """
-    algorithm = kind(hidden_sizes=(8,), alternatives_weight=weight).build(1, 15)
+    algorithm = kind(clock=False, hidden_sizes=(8,), alternatives_weight=weight).build(1, TEN_UES)
     with torch.no_grad():
         for name, values in algorithm.loss.state_dict().items():
             if values.ndim:
@@ -154,19 +157,23 @@ def flying_along_x(kind: type[DDPG], weight: float, slope: float) -> Algorithm:
     return algorithm
 
 
-def test_the_alternatives_are_to_hover_to_turn_round_and_to_flip_a_component() -> None:
-    found = alternatives(torch.tensor([[[0.5, -0.2]]]))
-    assert found.shape == (1, 4, 1, 2)
-    expected = torch.tensor([[0.0, 0.0], [-0.5, 0.2], [-0.5, -0.2], [0.5, 0.2]])
-    assert torch.equal(found[0, :, 0], expected)
+@pytest.mark.parametrize("clock", [False, True])
+def test_the_alternatives_are_to_hover_and_with_a_clock_to_join_the_best_flight(
+    clock: bool,
+) -> None:
+    flights, observation = BestFlights(1, TEN_UES), torch.zeros(1, 1, 15 + clock)
+    flights.positions[10, 0] = torch.tensor([0.1, -0.9])  # after the slot that the clock tells
+    found = DDPG(clock=clock).alternatives(flights, observation)
+    expected = [[0.0, 0.0], [0.5, -1.0]]
+    torch.testing.assert_close(found, torch.tensor(expected[: 1 + clock])[None, :, None])
 
 
-LITTLE = 0.9 * CLEARLY
-"""A slope at which turning round, from half speed, gains less than what counts."""
+LITTLE = 1.8 * CLEARLY
+"""A slope at which hovering, from half speed, gains less than what counts."""
 
 
 @pytest.mark.parametrize("kind", [DDPG, TD3])
-@pytest.mark.parametrize(("slope", "expected"), [(-1.0, 1.0), (-LITTLE, 0.0), (1.0, 0.0)])
+@pytest.mark.parametrize(("slope", "expected"), [(-1.0, 0.25), (-LITTLE, 0.0), (1.0, 0.0)])
 def test_an_actor_is_drawn_to_an_alternative_only_where_it_is_clearly_better(
     kind: type[DDPG], slope: float, expected: float
 ) -> None:
@@ -174,7 +181,7 @@ def test_an_actor_is_drawn_to_an_alternative_only_where_it_is_clearly_better(
     algorithm = flying_along_x(kind, weight, slope)
     plain = flying_along_x(kind, 0.0, slope).steps[1].loss(batch.clone())
     added = algorithm.steps[1].loss(batch.clone()) - plain
-    # To turn round is a distance of 1.
+    # To hover is a distance of 0.5.
     torch.testing.assert_close(added, torch.full((1, 5), weight * expected))
 
 
@@ -190,7 +197,7 @@ def test_the_target_counts_the_best_alternative_where_it_is_clearly_better(
     algorithm = flying_along_x(kind, 1.0, slope)
     with given_normals(iter([torch.zeros(1, 5, 2)])):
         loss = algorithm.steps[0].loss(batch.clone())
-    following = max(0.5 * slope, 0.5 * abs(slope) - CLEARLY)
+    following = max(0.5 * slope, -CLEARLY)
     critics = 1 + (kind is TD3)
     expected = torch.full((1, 5), critics * (2.0 + 0.95 * following) ** 2)
     expected[:, 0] = critics * 2.0**2
@@ -200,7 +207,9 @@ def test_the_target_counts_the_best_alternative_where_it_is_clearly_better(
 @pytest.mark.parametrize("kind", [DDPG, TD3])
 def test_weighing_alternatives_leaves_the_targets_without_gradients(kind: type[DDPG]) -> None:
     torch.manual_seed(0)
-    algorithm = kind(hidden_sizes=(8,), alternatives_weight=1.0, return_bound=0.5).build(2, 15)
+    algorithm = kind(
+        clock=False, hidden_sizes=(8,), alternatives_weight=1.0, return_bound=0.5
+    ).build(2, TEN_UES)
     for index in range(1, 5):
         batch = mini_batch(2, 20)
         batch[RETURN] = torch.randn(2, 20, 1)

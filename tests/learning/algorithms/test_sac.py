@@ -3,14 +3,14 @@ from tensordict import TensorDict
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.objectives import SACLoss, ValueEstimators
 
-from batches import mini_batch
+from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithms import SAC
 from hyuav.learning.networks import make_critic
 
 
 def test_every_learner_has_a_temperature_of_its_own() -> None:
     torch.manual_seed(0)
-    algorithm = SAC(hidden_sizes=(8,), temperature_learning_rate=0.05).build(3, 15)
+    algorithm = SAC(hidden_sizes=(8,), temperature_learning_rate=0.05).build(3, TEN_UES)
     batch = mini_batch(3, 40)
     for index in range(1, 10):
         algorithm.update_networks(batch, index)
@@ -21,7 +21,7 @@ def test_every_learner_has_a_temperature_of_its_own() -> None:
 
 def test_with_one_learner_the_losses_are_torchrls() -> None:
     torch.manual_seed(0)
-    ours = SAC(hidden_sizes=(8,), temperature_init=0.3).build(1, 15)
+    ours = SAC(hidden_sizes=(8,), temperature_init=0.3).build(1, TEN_UES)
     theirs = SACLoss(
         ours.explorer,
         make_critic(1, 15, (8,), "tanh"),
@@ -45,7 +45,7 @@ def test_with_one_learner_the_losses_are_torchrls() -> None:
 
 
 def test_the_noise_free_action_is_the_mode_of_the_explored_ones() -> None:
-    algorithm = SAC(hidden_sizes=(8,)).build(2, 15)
+    algorithm = SAC(hidden_sizes=(8,)).build(2, TEN_UES)
     data = TensorDict(observation=torch.randn(2, 9, 15), batch_size=[2, 9])
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         expected = algorithm.explorer(data.clone())["action"]

@@ -3,21 +3,32 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase, TensorDictParams, TensorDictSequential
+from tensordict.nn import (
+    TensorDictModule,
+    TensorDictModuleBase,
+    TensorDictParams,
+    TensorDictSequential,
+)
 from torch import Tensor, nn
 from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 
+from hyuav.learning.afterstate import Afterstate
+from hyuav.learning.control_variate import ControlVariate
 from hyuav.learning.exploration import WarmUp
-from hyuav.learning.networks import ACTIVATIONS
+from hyuav.learning.networks import ACTIVATIONS, make_critic
+from hyuav.learning.repetition import BestFlights
 from hyuav.learning.replay import Memory
 from hyuav.learning.targets import RaisedTD0
 from hyuav.parameters import Parameters, choice, count, number, parameter, sequence, switch
+from hyuav.scenario import Scenario
 
 learning_rate = number(0.0, 1.0)
+
+VARIATE_LEARNING_RATE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -43,8 +54,11 @@ class AlgorithmParameters(Parameters, ABC):
     reward_scale: float = parameter(number(above=0.0), 1.0)
     layer_norm: bool = parameter(switch, False)
     """In the critics."""
+    afterstate: bool = parameter(switch, False)
+    """Let the critics see where an action leads; see
+    :class:`hyuav.learning.afterstate.Afterstate`."""
     warm_up_episodes: int = parameter(count(0), 0)
-    """Flown at random; see :class:`hyuav.learning.exploration.WarmUp`."""
+    """Flown to places all over the map; see :class:`hyuav.learning.exploration.WarmUp`."""
     repeat_every: int = parameter(count(0), 0)
     """After the warm-up, and until actors restart, every n-th episode repeats the best flight so
     far; 0 for never. See :class:`hyuav.learning.repetition.BestFlights`."""
@@ -59,21 +73,71 @@ class AlgorithmParameters(Parameters, ABC):
     """Trust in returns above the target; see :class:`hyuav.learning.targets.RaisedTD0`."""
     return_bound_decay: float = parameter(number(0.0, 1.0), 1.0)
     """Per update."""
+    control_variate: bool = parameter(switch, False)
+    """Take off each reward what its slot's fading brought; see
+    :class:`hyuav.learning.control_variate.ControlVariate`."""
 
     @abstractmethod
-    def build(self, learners: int, observation_size: int) -> "Algorithm":
+    def build(self, learners: int, scenario: Scenario) -> "Algorithm":
         """Make the networks, their targets, the loss, the optimizers and the exploration.
 
         Args:
             learners: N.
-            observation_size: U + 5, or U + 6 with a clock.
+            scenario: that they fly.
         """
+
+    def assemble(self, learners: int, scenario: Scenario) -> "Algorithm":
+        """What :meth:`build` makes, and around it what works with any algorithm.
+
+        Args:
+            learners: N.
+            scenario: that they fly.
+        """
+        algorithm = self.build(learners, scenario)
+        if self.warm_up_episodes:
+            warm_up = WarmUp(learners, self.warm_up_episodes, scenario)
+            explorer = TensorDictSequential(algorithm.explorer, warm_up)
+            algorithm = replace(algorithm, explorer=explorer)
+        if self.control_variate:
+            variate = ControlVariate(learners, scenario, self.reward_scale, clock=self.clock)
+            optimizer = adam(variate, VARIATE_LEARNING_RATE)
+            step = GradientStep("control variate", variate.loss, optimizer)
+            steps = (step, *algorithm.steps)
+            algorithm = replace(algorithm, steps=steps, control_variate=variate)
+        return algorithm
+
+    def observation_size(self, scenario: Scenario) -> int:
+        """U + 5, or U + 6 with a clock."""
+        return scenario.num_ues + 5 + self.clock
+
+    def make_critic(self, learners: int, scenario: Scenario) -> TensorDictModule:
+        """Q(s, a) of N learners, as :func:`hyuav.learning.networks.make_critic` describes it."""
+        afterstate = None
+        if self.afterstate:
+            afterstate = Afterstate(scenario, clock=self.clock, geofence=self.geofence)
+        return make_critic(
+            learners,
+            self.observation_size(scenario),
+            self.hidden_sizes,
+            self.activation,
+            layer_norm=self.layer_norm,
+            afterstate=afterstate,
+        )
+
+    @property
+    def keeps_flights(self) -> bool:
+        """Whether best flights are of use."""
+        return self.repeat_every > 0
 
     @property
     def memory(self) -> Memory:
         """What is kept of each slot."""
         return Memory(
-            self.discount, self.reward_scale, self.finite_horizon, returns=self.return_bound > 0
+            self.discount,
+            self.reward_scale,
+            self.finite_horizon,
+            returns=self.return_bound > 0,
+            fading=self.control_variate,
         )
 
     def estimate_values(
@@ -102,12 +166,6 @@ class AlgorithmParameters(Parameters, ABC):
             )
             raised.set_keys(value=plain.tensor_keys.value)
             loss.make_value_estimator(raised)
-
-    def warmed_up(self, explorer: TensorDictModuleBase, learners: int) -> TensorDictModuleBase:
-        """What acts in training: the explorer, after the warm-up where there is one."""
-        if not self.warm_up_episodes:
-            return explorer
-        return TensorDictSequential(explorer, WarmUp(learners, self.warm_up_episodes))
 
     @property
     def explorer_normals(self) -> int:
@@ -140,12 +198,16 @@ class Algorithm:
     """Writes the ``action`` to take in training."""
     loss: LossModule
     """TorchRL's loss, which holds the networks' and the target networks' weights."""
+    best_flights: BestFlights
+    """Of each learner."""
     steps: tuple[GradientStep, ...]
     """Taken in this order in every update."""
     target: SoftUpdate
     """theta' <- tau theta + (1 - tau) theta'."""
     target_every: int = 1
     """The targets follow in every n-th update."""
+    control_variate: ControlVariate | None = None
+    """What takes the luck of the fading off the rewards of a mini-batch, if any."""
 
     def learning_rate_factor(self, episode: int) -> float:
         """Of the learning rates in an episode, from 1."""
@@ -184,6 +246,10 @@ class Algorithm:
         """Every combination of steps that an update takes."""
         return {self.due(index) for index in range(1, math.lcm(*self._periods) + 1)}
 
+    def fair(self, batch: TensorDictBase) -> TensorDictBase:
+        """A mini-batch (N, K) as the losses want to see it."""
+        return batch if self.control_variate is None else self.control_variate.fair(batch)
+
     def update_networks(self, batch: TensorDictBase, index: int) -> dict[str, Tensor]:
         """Take the gradient steps, eq. 9 and 10 for DDPG, on one mini-batch of each learner.
 
@@ -195,6 +261,7 @@ class Algorithm:
             the mean loss (N,) of each step that was taken, by the step's name.
         """
         losses = {}
+        batch = self.fair(batch)
         for step, due in zip(self.steps, self.due(index), strict=False):
             if not due:
                 continue
@@ -213,10 +280,17 @@ class Algorithm:
     @property
     def modules(self) -> nn.ModuleDict:
         """All weights and buffers that training changes."""
-        return nn.ModuleDict({"loss": self.loss, "explorer": self.explorer})
+        modules = {
+            "loss": self.loss,
+            "explorer": self.explorer,
+            "best_flights": self.best_flights,
+        }
+        if self.control_variate is not None:
+            modules["control_variate"] = self.control_variate
+        return nn.ModuleDict(modules)
 
 
-def adam(weights: TensorDictParams, learning_rate: float) -> torch.optim.Adam:
+def adam(weights: TensorDictParams | nn.Module, learning_rate: float) -> torch.optim.Adam:
     """Adam as the paper uses it, in PyTorch's fused form."""
     group = {"params": list(weights.parameters()), "initial_lr": learning_rate}
     return torch.optim.Adam([group], lr=learning_rate, fused=True)

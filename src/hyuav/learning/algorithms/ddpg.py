@@ -6,14 +6,16 @@ from typing import ClassVar
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictParams, TensorDictSequential
+from tensordict.nn import TensorDictModule, TensorDictParams, TensorDictSequential
 from torch import Tensor
 from torchrl.objectives import DDPGLoss, LossModule, SoftUpdate
 
 from hyuav.learning.algorithms.base import Algorithm, AlgorithmParameters, GradientStep, adam
 from hyuav.learning.exploration import GaussianNoise
-from hyuav.learning.networks import make_actor, make_critic
+from hyuav.learning.networks import make_actor
+from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import choice, number, parameter
+from hyuav.scenario import Scenario
 
 UNSATURATED = 2.0
 """An output before the tanh that still can be turned."""
@@ -37,17 +39,16 @@ class DDPG(AlgorithmParameters):
     saturation_penalty: float = parameter(number(0.0, 1e6), 0.0)
     """Weight of :func:`saturation` in the actor's loss."""
     alternatives_weight: float = parameter(number(0.0, 1e6), 0.0)
-    """How strongly the actor is drawn to the best of :func:`alternatives` where that is worth more
-    than what it does; with any weight, the critics' target counts whichever is worth more."""
+    """How strongly the actor is drawn to the better of :meth:`alternatives` where that is worth
+    more than what it does; with any weight, the critics' target counts whichever is worth more."""
 
     critic_name: ClassVar[str] = "value_network"
     """What the loss calls its critic."""
 
-    def build(self, learners: int, observation_size: int) -> Algorithm:
+    def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
-        sizes = (learners, observation_size, self.hidden_sizes, self.activation)
-        actor = make_actor(*sizes, stretch=self.action_stretch)
-        critic = make_critic(*sizes, layer_norm=self.layer_norm)
+        actor = self.make_actor(learners, scenario)
+        critic = self.make_critic(learners, scenario)
         loss = DDPGLoss(
             actor,
             critic,
@@ -56,24 +57,41 @@ class DDPG(AlgorithmParameters):
             delay_value=True,
             reduction="none",
         )
-        self.estimate_values(loss, learners, self.best_alternative(loss))
+        flights = BestFlights(learners, scenario)
+        self.estimate_values(loss, learners, self.best_alternative(loss, flights))
         critic_optimizer = adam(loss.value_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
             parameters=self,
             actor=actor,
-            explorer=self.warmed_up(TensorDictSequential(actor, self.noise(learners)), learners),
+            explorer=TensorDictSequential(actor, self.noise(learners)),
             loss=loss,
+            best_flights=flights,
             steps=(
                 GradientStep("critic", lambda batch: loss.loss_value(batch)[0], critic_optimizer),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.loss_actor(batch)[0] + self.restrained(loss, batch),
+                    lambda batch: loss.loss_actor(batch)[0] + self.restrained(loss, flights, batch),
                     actor_optimizer,
                 ),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
         )
+
+    def make_actor(self, learners: int, scenario: Scenario) -> TensorDictModule:
+        """mu(s) of N learners, as :func:`hyuav.learning.networks.make_actor` describes it."""
+        return make_actor(
+            learners,
+            self.observation_size(scenario),
+            self.hidden_sizes,
+            self.activation,
+            stretch=self.action_stretch,
+        )
+
+    @property
+    def keeps_flights(self) -> bool:
+        """See :attr:`AlgorithmParameters.keeps_flights`."""
+        return super().keeps_flights or self.alternatives_weight > 0
 
     def noise(self, learners: int) -> GaussianNoise:
         """What is added to the actions of N learners."""
@@ -85,7 +103,9 @@ class DDPG(AlgorithmParameters):
             self.noise_floor,
         )
 
-    def best_alternative(self, loss: LossModule) -> Callable[[Tensor], Tensor] | None:
+    def best_alternative(
+        self, loss: LossModule, flights: BestFlights
+    ) -> Callable[[Tensor], Tensor] | None:
         """What the target critics hold of the best alternative, less :data:`CLEARLY`.
 
         None where alternatives are not weighed.
@@ -94,9 +114,9 @@ class DDPG(AlgorithmParameters):
             return None
 
         def value(observation: Tensor) -> Tensor:
-            action = self.act(loss, loss.target_actor_network_params, observation)
             critics = getattr(loss, f"target_{self.critic_name}_params")
-            values = self.rate(loss, critics, observation, alternatives(action))
+            others = self.alternatives(flights, observation)
+            values = self.rate(loss, critics, observation, others)
             return values.amax(dim=1) - CLEARLY
 
         return value
@@ -123,20 +143,41 @@ class DDPG(AlgorithmParameters):
                 values.append(network.module(observed, actions))
         return torch.stack(values).amin(dim=0)
 
-    def restrained(self, loss: LossModule, batch: TensorDictBase) -> Tensor | float:
+    def restrained(
+        self, loss: LossModule, flights: BestFlights, batch: TensorDictBase
+    ) -> Tensor | float:
         """What is added to the actor's loss, so that it does not stick: (N, K)."""
         added: Tensor | float = 0.0
         if self.saturation_penalty:
             added = added + self.saturation_penalty * saturation(loss, batch)
         if self.alternatives_weight:
-            added = added + self.alternatives_weight * self.missed(loss, batch)
+            added = added + self.alternatives_weight * self.missed(loss, flights, batch)
         return added
 
-    def missed(self, loss: LossModule, batch: TensorDictBase) -> Tensor:
+    def alternatives(self, flights: BestFlights, observation: Tensor) -> Tensor:
+        """Other ways to act than the actor's: to hover and, with a clock, to join the best flight.
+
+        An actor climbs to the nearest summit of what its critic holds of actions. Where the best
+        one lies across a valley, one of these is likely to be beyond it.
+
+        Args:
+            flights: the best so far.
+            observation: (N, K, U + 5).
+
+        Returns:
+            (N, A, K, 2).
+        """
+        hovering = observation.new_zeros(*observation.shape[:-1], 2)
+        if not self.clock:
+            return hovering.unsqueeze(1)
+        return torch.stack([hovering, flights.towards(observation)], dim=1)
+
+    def missed(self, loss: LossModule, flights: BestFlights, batch: TensorDictBase) -> Tensor:
         """Squared distance of the actor from the best alternative, 0 where none is clearly better.
 
         Args:
             loss: with the actor and the critics.
+            flights: the best so far.
             batch: (N, K) transitions.
 
         Returns:
@@ -144,7 +185,7 @@ class DDPG(AlgorithmParameters):
         """
         observation = batch["observation"]
         action = self.act(loss, loss.actor_network_params, observation)
-        others = alternatives(action.detach())
+        others = self.alternatives(flights, observation)
         weights = getattr(loss, f"{self.critic_name}_params").data
         actions = torch.cat([action.detach().unsqueeze(1), others], dim=1)
         values = self.rate(loss, weights, observation, actions).squeeze(-1)
@@ -152,19 +193,6 @@ class DDPG(AlgorithmParameters):
         chosen = torch.take_along_dim(others, best[:, None, :, None], dim=1).squeeze(1)
         distance = (action - chosen).square().sum(dim=-1)
         return (worth > values[:, 0] + CLEARLY) * distance
-
-
-def alternatives(action: Tensor) -> Tensor:
-    """Other ways to fly than (N, K, 2): to hover, to turn round, to flip either component.
-
-    An actor climbs to the nearest summit of what its critic holds of actions. Where the best one
-    lies across a valley, in another direction or at rest, one of these is likely to be beyond it.
-
-    Returns:
-        (N, 4, K, 2).
-    """
-    signs = ((0.0, 0.0), (-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0))
-    return torch.stack([action * action.new_tensor(each) for each in signs], dim=1)
 
 
 def saturation(loss: LossModule, batch: TensorDictBase) -> Tensor:

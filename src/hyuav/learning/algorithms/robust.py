@@ -25,12 +25,14 @@ class Robust(AlgorithmParameters):
     finite_horizon: bool = parameter(switch, True)
     reward_scale: float = parameter(number(above=0.0), 0.05)
     layer_norm: bool = parameter(switch, True)
+    afterstate: bool = parameter(switch, True)
     warm_up_episodes: int = parameter(count(0), 100)
     repeat_every: int = parameter(count(0), 4)
     restart_after: int = parameter(count(0), 200)
     recency: float = parameter(number(1.0), 3.0)
     return_bound: float = parameter(number(0.0, 1.0), 0.3)
     return_bound_decay: float = parameter(number(0.0, 1.0), 0.999)
+    control_variate: bool = parameter(switch, True)
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class RobustDDPG(Robust, DDPG):
     noise_variance: float = parameter(number(0.0, 1e6), 0.16)
     noise_decay: float = parameter(number(0.0, 1.0), 0.985)
     noise_decay_per: str = parameter(choice("slot", "episode"), "episode")
-    noise_floor: float = parameter(number(0.0, 1.0), 0.25)
+    noise_floor: float = parameter(number(0.0, 1.0), 0.1)
     action_stretch: float = parameter(number(1.0, 2.0), 1.04)
     saturation_penalty: float = parameter(number(0.0, 1e6), 0.1)
     alternatives_weight: float = parameter(number(0.0, 1e6), 0.1)

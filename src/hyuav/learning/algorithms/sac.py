@@ -20,8 +20,10 @@ from hyuav.learning.algorithms.base import (
     adam,
     learning_rate,
 )
-from hyuav.learning.networks import LearnerMLP, make_critic
+from hyuav.learning.networks import LearnerMLP
+from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import number, parameter
+from hyuav.scenario import Scenario
 
 
 class LearnerSACLoss(SACLoss):
@@ -63,8 +65,9 @@ class SAC(AlgorithmParameters):
     temperature_init: float = parameter(number(1e-6, 1e6), 0.2)
     target_entropy: float = parameter(number(-100.0, 100.0), -2.0)
 
-    def build(self, learners: int, observation_size: int) -> Algorithm:
+    def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
+        observation_size = self.observation_size(scenario)
         network = LearnerMLP(learners, observation_size, self.hidden_sizes, 4, self.activation)
         distribution = TensorDictModule(
             nn.Sequential(network, NormalParamExtractor()),
@@ -81,13 +84,7 @@ class SAC(AlgorithmParameters):
         )
         loss = LearnerSACLoss(
             explorer,
-            make_critic(
-                learners,
-                observation_size,
-                self.hidden_sizes,
-                self.activation,
-                layer_norm=self.layer_norm,
-            ),
+            self.make_critic(learners, scenario),
             learners=learners,
             alpha_init=self.temperature_init,
             num_qvalue_nets=2,
@@ -110,8 +107,9 @@ class SAC(AlgorithmParameters):
         return Algorithm(
             parameters=self,
             actor=TensorDictSequential(distribution, mean),
-            explorer=self.warmed_up(explorer, learners),
+            explorer=explorer,
             loss=loss,
+            best_flights=BestFlights(learners, scenario),
             steps=(
                 GradientStep(
                     "critic",

@@ -8,8 +8,9 @@ from torchrl.objectives import SoftUpdate, TD3Loss
 
 from hyuav.learning.algorithms.base import Algorithm, GradientStep, adam
 from hyuav.learning.algorithms.ddpg import DDPG
-from hyuav.learning.networks import make_actor, make_critic
+from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import count, number, parameter
+from hyuav.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -22,11 +23,10 @@ class TD3(DDPG):
 
     critic_name: ClassVar[str] = "qvalue_network"
 
-    def build(self, learners: int, observation_size: int) -> Algorithm:
+    def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
-        sizes = (learners, observation_size, self.hidden_sizes, self.activation)
-        actor = make_actor(*sizes, stretch=self.action_stretch)
-        critic = make_critic(*sizes, layer_norm=self.layer_norm)
+        actor = self.make_actor(learners, scenario)
+        critic = self.make_critic(learners, scenario)
         loss = TD3Loss(
             actor,
             critic,
@@ -37,14 +37,16 @@ class TD3(DDPG):
             loss_function="l2",
             reduction="none",
         )
-        self.estimate_values(loss, learners, self.best_alternative(loss))
+        flights = BestFlights(learners, scenario)
+        self.estimate_values(loss, learners, self.best_alternative(loss, flights))
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
             parameters=self,
             actor=actor,
-            explorer=self.warmed_up(TensorDictSequential(actor, self.noise(learners)), learners),
+            explorer=TensorDictSequential(actor, self.noise(learners)),
             loss=loss,
+            best_flights=flights,
             steps=(
                 GradientStep(
                     "critic",
@@ -54,7 +56,7 @@ class TD3(DDPG):
                 ),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.actor_loss(batch)[0] + self.restrained(loss, batch),
+                    lambda batch: loss.actor_loss(batch)[0] + self.restrained(loss, flights, batch),
                     actor_optimizer,
                     every=self.actor_every,
                 ),

@@ -1,0 +1,59 @@
+"""Where an action leads: what is known of a slot before it is flown."""
+
+import torch
+from torch import Tensor, nn
+
+from hyuav.envs.transforms import fenced
+from hyuav.scenario import Scenario
+from hyuav.system import SecureOffloadingSystem
+
+BLUR = 0.02
+"""Of the coverage's edge, in units of the map's side; so that a gradient is felt beside it."""
+
+
+class Afterstate(nn.Module):
+    """The state between an action and its slot's fading (Sutton and Barto, 2018, section 6.8).
+
+    How the helper flies is known, how it earns is not. The reward and all that follows depend on
+    where the action leads alone, and on the slots that are left; so this is what a critic needs to
+    see, instead of a position and a velocity whose sum it would have to learn. Which UEs are
+    covered there changes the reward in steps a few metres apart, too narrow to be learned from
+    distances; so coverage is shown as well, as a tanh of the distance to its edge.
+
+    Args:
+        scenario: its nodes, speed limit and map.
+        clock: whether the slots flown are observed.
+        geofence: whether flights are slowed to end on the map.
+    """
+
+    def __init__(self, scenario: Scenario, *, clock: bool, geofence: bool) -> None:
+        super().__init__()
+        self._system = SecureOffloadingSystem(scenario, torch.get_default_device())
+        self._norm_limit = self._system.norm_limit(["hybrid"])
+        self._clock, self._geofence = clock, geofence
+        self.size = 2 * scenario.num_ues + 5 + clock
+
+    def forward(self, observation: Tensor, action: Tensor) -> Tensor:
+        """Map observations (..., U + 5) and actions (..., 2) to features (..., 2 U + 5).
+
+        In order: the position, the distances to the UEs, L and E, the coverage of each UE, and
+        whether the map was left (1, otherwise -1), and with a clock the slots flown; all of order
+        one.
+        """
+        scenario = self._system.scenario
+        half_side = scenario.map_side / 2
+        position = observation[..., :2] * half_side
+        if self._geofence:
+            action = fenced(scenario, position, action)
+        moved = self._system.move(position, action, self._norm_limit)
+        distances = self._system.distances(moved.position)
+        inside = scenario.coverage_radius - distances[..., : scenario.num_ues]
+        features = [
+            moved.position / half_side,
+            distances / half_side - 1.0,
+            torch.tanh(inside / (BLUR * scenario.map_side)),
+            moved.off_map.unsqueeze(-1) * 2.0 - 1.0,
+        ]
+        if self._clock:
+            features.append(observation[..., -1:])
+        return torch.cat(features, dim=-1)
