@@ -21,7 +21,6 @@ def mini_batch(learners: int, size: int, observation_size: int = 15) -> TensorDi
             reward=reward,
             done=flag,
             terminated=flag,
-            **{"return": reward.clone()},
             batch_size=shape,
         ),
         batch_size=shape,

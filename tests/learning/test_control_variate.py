@@ -82,7 +82,7 @@ def test_scaled_rewards_have_scaled_luck() -> None:
 
 def test_without_fading_there_is_no_luck() -> None:
     scenario = dataclasses.replace(SCENARIO, num_slots=4, fading=False)
-    algorithm = DDPG(hidden_sizes=(8,), control_variate=True, return_bound=0.5)
+    algorithm = DDPG(hidden_sizes=(8,), control_variate=True, repeat_every=2)
     trained = Cohort(scenario, [Learner("relay", 0)], algorithm, 40, 8, None)
     for _ in range(6):
         trained.fly()

@@ -4,10 +4,9 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import ReplayBuffer
 
 from hyuav.learning.replay import (
-    RETURN,
+    FADING,
     TRANSITION,
     Memory,
-    favouring_recent,
     latest,
     make_replay,
     sampled_slots,
@@ -42,25 +41,6 @@ def test_every_stored_slot_is_drawn_as_often_and_no_other(length: int) -> None:
     assert torch.equal(sampled_slots(grid, torch.tensor([length])), drawn)
 
 
-def test_recent_slots_are_drawn_more_often_and_all_sometimes() -> None:
-    grid = (torch.arange(80_000) + 0.5) / 80_000
-    drawn = sampled_slots(favouring_recent(grid, 3.0), 8).bincount(minlength=8) / 80_000
-    ages = torch.arange(8, -1, -1) / 8  # of a slot's edges, as shares of the oldest's
-    expected = ages[:-1] ** (1 / 3) - ages[1:] ** (1 / 3)
-    torch.testing.assert_close(drawn, expected, atol=1e-3, rtol=0.0)
-    assert drawn.argmax() == 7
-
-
-@pytest.mark.parametrize("stored", [3, 7, 11])  # of 5 that are kept
-def test_by_age_the_greatest_numbers_draw_the_newest_slots(stored: int) -> None:
-    uniforms = iter([torch.tensor([[0.0, 0.999]])])
-    replay = make_replay(5, 2, uniforms, torch.device("cpu"), by_age=True)
-    for slot in range(stored):
-        replay.extend(Memory().transition(transition(1, slot)).unsqueeze(0))
-    oldest, newest = replay.sample()["next", "reward"].flatten().tolist()
-    assert (oldest, newest) == (max(0, stored - 5), stored - 1)
-
-
 def test_each_learner_samples_only_its_own_transitions() -> None:
     replay = replay_of(3, 50, 200)
     for slot in range(30):
@@ -91,37 +71,6 @@ def test_a_transition_holds_what_the_losses_read_and_nothing_else() -> None:
     assert set(kept.keys(include_nested=True, leaves_only=True)) == set(TRANSITION)
 
 
-def finish(memory: Memory, capacity: int, episodes: int, num_slots: int) -> ReplayBuffer:
-    """A replay after some episodes in which slot t of the first learner earns t."""
-    replay = replay_of(2, capacity, 4)
-    for _ in range(episodes):
-        for slot in range(num_slots):
-            replay.extend(memory.transition(transition(2, slot)).unsqueeze(0))
-        rewards = replay.storage._storage["next", "reward"][latest(replay, num_slots)]
-        memory.finish_episode(replay, rewards)
-    return replay
-
-
-def test_a_return_is_what_the_episode_brings_from_its_slot_on() -> None:
-    memory = Memory(discount=0.5, returns=True)
-    stored = finish(memory, 30, 2, 4)[:][RETURN][..., 0]
-    expected = [0.5 * 1 + 0.25 * 2 + 0.125 * 3, 1 + 0.5 * 2 + 0.25 * 3, 2 + 0.5 * 3, 3.0]
-    assert stored[:, 0].tolist() == expected * 2
-    assert stored[3::4, 1].tolist() == [1003.0, 1003.0]
-
-
-def test_returns_find_their_slots_where_the_replay_begins_anew() -> None:
-    stored = finish(Memory(returns=True), 10, 3, 4)[:]
-    rewards = stored["next", "reward"][..., 0]
-    expected = [[6.0, 6.0, 5.0, 3.0][int(slot)] for slot in rewards[:, 0]]
-    assert stored[RETURN][:, 0, 0].tolist() == expected
-
-
-def test_a_return_is_unknown_before_the_episode_ends() -> None:
-    memory = Memory(returns=True)
-    assert torch.equal(memory.transition(transition(2, 1))[RETURN], torch.full((2, 1), -torch.inf))
-
-
 def test_where_the_horizon_is_finite_an_episode_ends_the_return() -> None:
     slot = transition(2, 1)
     slot["next", "done"] = torch.tensor([[True], [False]])
@@ -134,3 +83,20 @@ def test_where_the_horizon_is_finite_an_episode_ends_the_return() -> None:
 def test_rewards_are_kept_in_the_scale_asked_for() -> None:
     kept = Memory(reward_scale=0.1).transition(transition(2, 5))
     torch.testing.assert_close(kept["next", "reward"], torch.tensor([[0.5], [100.5]]))
+
+
+def test_the_fading_is_kept_where_a_learner_wants_it() -> None:
+    slot = transition(2, 5)
+    slot[FADING] = torch.rand(2, 32)
+    assert torch.equal(Memory(fading=True).transition(slot)[FADING], slot[FADING])
+    assert FADING not in Memory().transition(slot).keys(include_nested=True)
+
+
+@pytest.mark.parametrize("stored", [3, 7, 11])  # of 5 that are kept
+def test_the_latest_slots_are_found_also_where_the_replay_begins_anew(stored: int) -> None:
+    replay = replay_of(1, 5, 4)
+    for slot in range(stored):
+        replay.extend(Memory().transition(transition(1, slot)).unsqueeze(0))
+    found = replay.storage._storage["next", "reward"][latest(replay, 3)].flatten()
+    assert found.tolist() == [stored - 3.0, stored - 2.0, stored - 1.0]
+    assert len(latest(replay, 9)) == 5

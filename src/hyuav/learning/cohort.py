@@ -13,7 +13,7 @@ from torchrl.collectors import Collector
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.repetition import as_planned
-from hyuav.learning.replay import clear_unused, favouring_recent, forget, latest, make_replay
+from hyuav.learning.replay import clear_unused, forget, latest, make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import (
     copy_weights,
@@ -91,9 +91,8 @@ class Cohort:
         self.replay = make_replay(
             replay_size,
             batch_size,
-            map(self._favour, self._streams["sampling"]),
+            self._streams["sampling"],
             self.env.device,
-            by_age=algorithm.recency > 1.0,
         )
         self.episode = self.updates = 0
         self.collector = Collector(
@@ -136,11 +135,6 @@ class Cohort:
         planned = self.algorithm.best_flights.actions
         return planned if self.algorithm.repeats(self.episode) else planned * torch.nan
 
-    def _favour(self, uniform: Tensor) -> Tensor:
-        """Numbers by which transitions are drawn, in this episode's favour of recent ones."""
-        recency = self.algorithm.recency(self.episode)
-        return uniform if recency == 1.0 else favouring_recent(uniform, recency)
-
     @property
     def learns(self) -> bool:
         """Whether every slot of the next episode is followed by an update."""
@@ -178,18 +172,23 @@ class Cohort:
         self.episode += 1
         self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
-        self._remember()
+        if self.algorithm.parameters.keeps_flights:
+            self._keep_flight()
         self._stop_where_not_finite(*flown)
         return flown
 
-    def _remember(self) -> None:
-        """What the episode brought, less its luck where that is known."""
-        slots = latest(self.replay, self.scenario.num_slots)
-        episode = self.replay.storage._storage[slots].transpose(0, 1)
-        rewards = self.algorithm.fair(episode)["next", "reward"].transpose(0, 1)
-        self.algorithm.parameters.memory.finish_episode(self.replay, rewards)
-        if self.algorithm.parameters.keeps_flights:
-            self.algorithm.best_flights.keep(rewards.sum(dim=(0, 2)), self.replay)
+    def _keep_flight(self) -> None:
+        """Keep the episode's flight where it is the best so far.
+
+        It counts what it earned; or where it is known, what is to be expected of it.
+        """
+        flown = self.replay.storage._storage[latest(self.replay, self.scenario.num_slots)]
+        flights, variate = self.algorithm.best_flights, self.algorithm.control_variate
+        reward = flown["next", "reward"].sum(dim=(0, 2))
+        if variate is not None:
+            reward = variate.expected(flown["next", "observation"])
+            flights.reward.copy_(variate.expected(flights.observations).nan_to_num(-torch.inf))
+        flights.keep(flown, reward)
 
     def _stop_where_not_finite(self, reward: Tensor, losses: dict[str, Tensor]) -> None:
         finite = finite_learners(self.algorithm.loss) & reward.isfinite()
@@ -208,7 +207,6 @@ class Cohort:
     def _fly_compiled(self, compiled: CompiledSlots) -> tuple[Tensor, dict[str, Tensor]]:
         slots, draws = self.scenario.num_slots, self.env.base_env.draws
         blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
-        blocks["sampling"] = self._favour(blocks["sampling"])
         if self.algorithm.parameters.repeat_every:
             blocks["plan"] = self._plan()
         if self.scenario.fading:

@@ -4,6 +4,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
 
+from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.networks import LearnerMLP
 from hyuav.learning.replay import FADING
 from hyuav.scenario import Scenario
@@ -11,9 +12,6 @@ from hyuav.scenario import Scenario
 HIDDEN_SIZES = (64, 64)
 
 LUCK = ("next", "luck")
-
-MODE = 2
-"""Where in an observation the mode stands, which depends on the slot's fading."""
 
 
 class ControlVariate(nn.Module):
@@ -37,27 +35,32 @@ class ControlVariate(nn.Module):
         self, learners: int, scenario: Scenario, reward_scale: float, *, clock: bool
     ) -> None:
         super().__init__()
-        inputs, outputs = scenario.num_ues + 5 + clock, 1 + 3 * scenario.num_ues + 2
         self._scale = reward_scale
-        self.network = LearnerMLP(learners, inputs, HIDDEN_SIZES, outputs, "tanh")
+        self.afterstate = Afterstate(scenario, clock=clock, geofence=True)
+        outputs = 1 + 3 * scenario.num_ues + 2
+        self.network = LearnerMLP(learners, self.afterstate.size, HIDDEN_SIZES, outputs, "tanh")
 
-    def forward(self, following: Tensor, fading: Tensor) -> tuple[Tensor, Tensor]:
-        """What is to be expected of a slot, and what its luck added, each (N, K, 1).
+    def forward(self, following: Tensor) -> tuple[Tensor, Tensor]:
+        """What is to be expected of slots (N, K, 1), and what each power adds (N, K, 3 U + 2).
 
         Args:
-            following: observations (N, K, U + 5) at the end of the slot.
-            fading: powers (N, K, 3 U + 2) in the slot.
+            following: observations (N, K, U + 5) at the end of the slots; of these the position
+                and the clock count, and not the mode, which depends on the fading.
         """
-        place = following.clone()
-        place[..., MODE] = 0.0
-        outputs = self.network(place) * self._scale
-        expected, weights = outputs[..., :1], outputs[..., 1:]
-        return expected, (weights * (fading - 1.0)).sum(dim=-1, keepdim=True)
+        hovering = following.new_zeros(*following.shape[:-1], 2)
+        outputs = self.network(self.afterstate(following, hovering)) * self._scale
+        return outputs[..., :1], outputs[..., 1:]
+
+    @torch.no_grad()
+    def expected(self, following: Tensor) -> Tensor:
+        """What is to be expected of a flight (T, N, U + 5), by all that was earned so far: (N,)."""
+        return self(following.transpose(0, 1))[0].sum(dim=(1, 2))
 
     @torch.no_grad()
     def luck(self, batch: TensorDictBase) -> Tensor:
         """What the fading added to the rewards of a mini-batch (N, K): (N, K, 1)."""
-        return self(batch["next", "observation"], batch[FADING])[1]
+        _, weights = self(batch["next", "observation"])
+        return _luck(weights, batch)
 
     def fair(self, batch: TensorDictBase) -> TensorDictBase:
         """A mini-batch (N, K) with its rewards less their luck, which is told beside."""
@@ -69,6 +72,10 @@ class ControlVariate(nn.Module):
 
     def loss(self, batch: TensorDictBase) -> Tensor:
         """Squared error (N, K) of the regression on a mini-batch as :meth:`fair` gives it."""
-        expected, luck = self(batch["next", "observation"], batch[FADING])
+        expected, weights = self(batch["next", "observation"])
         reward = batch["next", "reward"] + batch[LUCK]
-        return (reward - expected - luck).square().squeeze(-1)
+        return (reward - expected - _luck(weights, batch)).square().squeeze(-1)
+
+
+def _luck(weights: Tensor, batch: TensorDictBase) -> Tensor:
+    return (weights * (batch[FADING] - 1.0)).sum(dim=-1, keepdim=True)

@@ -3,9 +3,7 @@
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
-from torchrl.data import ReplayBuffer
 
-from hyuav.learning.replay import latest
 from hyuav.scenario import Scenario
 
 
@@ -26,38 +24,38 @@ class BestFlights(nn.Module):
     Args:
         learners: N.
         scenario: that they fly.
+        size: of an observation, U + 5 or U + 6.
     """
 
     reward: Tensor
     """(N,), what each earned; minus infinity before the first."""
     actions: Tensor
     """(T, N, 2)."""
-    positions: Tensor
-    """(T, N, 2), where each was after each slot, in units of half the map's side."""
+    observations: Tensor
+    """(T, N, U + 6), what each saw after each slot."""
 
-    def __init__(self, learners: int, scenario: Scenario) -> None:
+    def __init__(self, learners: int, scenario: Scenario, size: int) -> None:
         super().__init__()
         shape = scenario.num_slots, learners, 2
         self._slots_per_unit = scenario.num_slots / 2
         self._reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
         self.register_buffer("reward", torch.full((learners,), -torch.inf))
         self.register_buffer("actions", torch.full(shape, torch.nan))
-        self.register_buffer("positions", torch.full(shape, torch.nan))
+        self.register_buffer("observations", torch.full((*shape[:2], size), torch.nan))
 
-    def keep(self, reward: Tensor, replay: ReplayBuffer) -> None:
-        """Keep the flight whose slots were stored last where it earned more than any before.
+    def keep(self, flown: TensorDictBase, reward: Tensor) -> None:
+        """Keep the flight of an episode where it earned more than any before.
 
         Args:
+            flown: its slots (T, N).
             reward: (N,) that it earned.
-            replay: of capacity T at least.
         """
-        flown = replay.storage._storage[latest(replay, len(self.actions))]
         better = reward > self.reward
         self.reward.copy_(torch.where(better, reward, self.reward))
         where = better.unsqueeze(-1)
         self.actions.copy_(torch.where(where, flown["action"], self.actions))
-        positions = flown["next", "observation"][..., :2]
-        self.positions.copy_(torch.where(where, positions, self.positions))
+        following = flown["next", "observation"]
+        self.observations.copy_(torch.where(where, following, self.observations))
 
     def towards(self, observation: Tensor) -> Tensor:
         """Actions (N, K, 2) that join the best flights by the next slot, or as soon as possible.
@@ -68,7 +66,8 @@ class BestFlights(nn.Module):
             observation: (N, K, U + 6), with a clock.
         """
         flown = ((observation[..., -1] + 1.0) * self._slots_per_unit).round().long()
-        slot = flown.clamp(max=len(self.positions) - 1).unsqueeze(-1).expand(*flown.shape, 2)
-        position = torch.take_along_dim(self.positions.transpose(0, 1), slot, dim=1)
+        slot = flown.clamp(max=len(self.actions) - 1).unsqueeze(-1).expand(*flown.shape, 2)
+        way = self.observations[..., :2].transpose(0, 1)
+        position = torch.take_along_dim(way, slot, dim=1)
         action = (position - observation[..., :2]) / self._reach
         return action.clamp(-1.0, 1.0).nan_to_num(0.0)

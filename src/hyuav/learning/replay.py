@@ -22,28 +22,10 @@ TRANSITION: tuple[NestedKey, ...] = (
 
 FADING: NestedKey = ("next", "fading")
 
-RETURN: NestedKey = ("next", "return")
-
 
 def sampled_slots(uniform: Tensor, length: int | Tensor) -> Tensor:
     """Which of the ``length`` slots stored are drawn, from numbers in [0, 1): (N, K) int64."""
     return (uniform * length).long().clamp(max=length - 1)  # rounding may reach the length
-
-
-def favouring_recent(uniform: Tensor, recency: float) -> Tensor:
-    """Bring numbers in [0, 1) nearer to 1: the age that they stand for, 1 - u, to this power."""
-    return 1.0 - (1.0 - uniform) ** recency
-
-
-def from_the_oldest(drawn: Tensor, cursor: int | Tensor, length: int | Tensor) -> Tensor:
-    """Where in a round-robin storage the slots are that were drawn in order of age, 0 the oldest.
-
-    Args:
-        drawn: (N, K) int64.
-        cursor: where the next slot will be stored.
-        length: slots stored.
-    """
-    return (drawn + cursor) % length
 
 
 class LearnerSampler(RandomSampler):
@@ -51,31 +33,23 @@ class LearnerSampler(RandomSampler):
 
     Args:
         uniforms: gives numbers in [0, 1) for each mini-batch, (N, K).
-        writer: of the storage, where a number stands for an age, 1 for the newest.
     """
 
-    def __init__(self, uniforms: Iterator[Tensor], writer: RoundRobinWriter | None = None) -> None:
+    def __init__(self, uniforms: Iterator[Tensor]) -> None:
         super().__init__()
-        self._uniforms, self._writer = uniforms, writer
+        self._uniforms = uniforms
 
     def sample(
         self, storage: Storage, batch_size: int
     ) -> tuple[tuple[Tensor, Tensor], dict[str, Any]]:
         """The (slots, learners) index, each (N, K), into a storage of (capacity, N)."""
         slots = sampled_slots(next(self._uniforms)[:, :batch_size], len(storage))
-        if self._writer is not None:
-            slots = from_the_oldest(slots, self._writer._cursor, len(storage))
         learners = torch.arange(len(slots), device=slots.device).unsqueeze(-1)
         return (slots, learners.expand(slots.shape)), {}
 
 
 def make_replay(
-    capacity: int,
-    batch_size: int,
-    uniforms: Iterator[Tensor],
-    device: torch.device,
-    *,
-    by_age: bool = False,
+    capacity: int, batch_size: int, uniforms: Iterator[Tensor], device: torch.device
 ) -> ReplayBuffer:
     """The buffer B of Algorithm 1 for N learners.
 
@@ -87,14 +61,11 @@ def make_replay(
         batch_size: K.
         uniforms: gives numbers in [0, 1) for each mini-batch, (N, K).
         device: of the storage.
-        by_age: let greater numbers draw newer transitions; otherwise their order is that of the
-            storage.
     """
-    writer = RoundRobinWriter()
     return ReplayBuffer(
         storage=LazyTensorStorage(capacity, device=device),
-        sampler=LearnerSampler(uniforms, writer if by_age else None),
-        writer=writer,
+        sampler=LearnerSampler(uniforms),
+        writer=RoundRobinWriter(),
         batch_size=batch_size,
     )
 
@@ -127,45 +98,23 @@ def forget(replay: ReplayBuffer, where: Tensor) -> None:
 class Memory:
     """What a learner keeps of a slot: a transition, as it wants to see it."""
 
-    discount: float = 1.0
     reward_scale: float = 1.0
     """Factor of all rewards."""
     finite_horizon: bool = False
     """The last slot of an episode ends the return, which otherwise goes on past it."""
-    returns: bool = False
-    """Keep ``("next", "return")`` too: what the episode brought from this slot on."""
     fading: bool = False
     """Keep the slot's fading powers too."""
 
     @property
     def names(self) -> tuple[NestedKey, ...]:
         """The entries of a transition."""
-        fading = (FADING,) if self.fading else ()
-        return (*TRANSITION, *fading, *((RETURN,) if self.returns else ()))
+        return (*TRANSITION, FADING) if self.fading else TRANSITION
 
     def transition(self, slot: TensorDictBase) -> TensorDictBase:
-        """What is kept of a collected slot (N,); its return is not known yet."""
-        kept = slot.select(*TRANSITION, *((FADING,) if self.fading else ()))
+        """What is kept of a collected slot (N,)."""
+        kept = slot.select(*self.names)
         if self.reward_scale != 1.0:
             kept["next", "reward"] = kept["next", "reward"] * self.reward_scale
         if self.finite_horizon:
             kept["next", "terminated"] = kept["next", "done"].clone()
-        if self.returns:
-            kept[RETURN] = torch.full_like(kept["next", "reward"], -torch.inf)
         return kept
-
-    def finish_episode(self, replay: ReplayBuffer, rewards: Tensor) -> None:
-        """Fill in the returns of an episode.
-
-        Args:
-            replay: where its slots were stored last.
-            rewards: (slots, N, 1), of all that are still there, to be counted.
-        """
-        if not self.returns:
-            return
-        returned = replay.storage._storage[RETURN]
-        following = torch.zeros_like(rewards[0])
-        slots = latest(replay, len(rewards)).tolist()
-        for slot, reward in zip(reversed(slots), rewards.flip(0), strict=True):
-            following = reward + self.discount * following
-            returned[slot] = following

@@ -19,7 +19,7 @@ from torchrl.envs import TransformedEnv
 from hyuav.envs.draws import GivenDraws
 from hyuav.learning.algorithms import Algorithm, GradientStep
 from hyuav.learning.repetition import as_planned
-from hyuav.learning.replay import from_the_oldest, sampled_slots
+from hyuav.learning.replay import sampled_slots
 from hyuav.randomness import given_normals
 from hyuav.recording import compile_function
 from hyuav.system import Tasks
@@ -194,8 +194,6 @@ class CompiledSlots:
 
     def _sample(self, uniform: Tensor) -> TensorDictBase:
         slots = sampled_slots(uniform, self._length)
-        if self._algorithm.parameters.recency > 1.0:
-            slots = from_the_oldest(slots, self._cursor, self._length)
         batch = TensorDict(batch_size=uniform.shape, device=self._env.device)
         for name in self._algorithm.parameters.memory.names:
             batch[name] = self._storage[name][slots, self._learners]

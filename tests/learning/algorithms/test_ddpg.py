@@ -11,7 +11,6 @@ from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithms import DDPG, TD3, Algorithm
 from hyuav.learning.algorithms.ddpg import CLEARLY, UNSATURATED, saturation
 from hyuav.learning.repetition import BestFlights
-from hyuav.learning.replay import RETURN
 from hyuav.randomness import given_normals
 
 SIZES = (15, 12, 8, 8, 2)
@@ -106,9 +105,6 @@ def test_the_defaults_are_the_papers() -> None:
         "action_stretch": 1.0,
         "saturation_penalty": 0.0,
         "alternatives_weight": 0.0,
-        "recency": 1.0,
-        "return_bound": 0.0,
-        "return_bound_decay": 1.0,
         "control_variate": False,
         "afterstate": False,
         "noise_floor": 0.0,
@@ -161,8 +157,10 @@ def flying_along_x(kind: type[DDPG], weight: float, slope: float) -> Algorithm:
 def test_the_alternatives_are_to_hover_and_with_a_clock_to_join_the_best_flight(
     clock: bool,
 ) -> None:
-    flights, observation = BestFlights(1, TEN_UES), torch.zeros(1, 1, 15 + clock)
-    flights.positions[10, 0] = torch.tensor([0.1, -0.9])  # after the slot that the clock tells
+    flights, observation = BestFlights(1, TEN_UES, 16), torch.zeros(1, 1, 15 + clock)
+    flights.observations[10, 0, :2] = torch.tensor(
+        [0.1, -0.9]
+    )  # after the slot that the clock tells
     found = DDPG(clock=clock).alternatives(flights, observation)
     expected = [[0.0, 0.0], [0.5, -1.0]]
     torch.testing.assert_close(found, torch.tensor(expected[: 1 + clock])[None, :, None])
@@ -207,12 +205,9 @@ def test_the_target_counts_the_best_alternative_where_it_is_clearly_better(
 @pytest.mark.parametrize("kind", [DDPG, TD3])
 def test_weighing_alternatives_leaves_the_targets_without_gradients(kind: type[DDPG]) -> None:
     torch.manual_seed(0)
-    algorithm = kind(
-        clock=False, hidden_sizes=(8,), alternatives_weight=1.0, return_bound=0.5
-    ).build(2, TEN_UES)
+    algorithm = kind(clock=False, hidden_sizes=(8,), alternatives_weight=1.0).build(2, TEN_UES)
     for index in range(1, 5):
         batch = mini_batch(2, 20)
-        batch[RETURN] = torch.randn(2, 20, 1)
         algorithm.update_networks(batch, index)
         algorithm.update_targets(index)
     for name, values in algorithm.loss.named_buffers():

@@ -65,14 +65,6 @@ class AlgorithmParameters(Parameters, ABC):
     restart_after: int = parameter(count(0), 0)
     """Episodes from which on an actor that is evaluated and found worse than it was goes on from
     its best weights; 0 for never."""
-    recency: float = parameter(number(1.0), 1.0)
-    """Once actors restart, the power to which the ages of the transitions drawn are raised, as
-    shares of the oldest's: 1 draws all alike, more prefers recent ones, which lie along the
-    flights that are being refined."""
-    return_bound: float = parameter(number(0.0, 1.0), 0.0)
-    """Trust in returns above the target; see :class:`hyuav.learning.targets.RaisedTD0`."""
-    return_bound_decay: float = parameter(number(0.0, 1.0), 1.0)
-    """Per update."""
     control_variate: bool = parameter(switch, False)
     """Take off each reward what its slot's fading brought; see
     :class:`hyuav.learning.control_variate.ControlVariate`."""
@@ -133,34 +125,25 @@ class AlgorithmParameters(Parameters, ABC):
     def memory(self) -> Memory:
         """What is kept of each slot."""
         return Memory(
-            self.discount,
             self.reward_scale,
             self.finite_horizon,
-            returns=self.return_bound > 0,
             fading=self.control_variate,
         )
 
     def estimate_values(
-        self,
-        loss: LossModule,
-        learners: int,
-        alternative: Callable[[Tensor], Tensor] | None = None,
+        self, loss: LossModule, alternative: Callable[[Tensor], Tensor] | None = None
     ) -> None:
         """Give a loss its target.
 
         Args:
             loss: of N learners.
-            learners: N.
             alternative: see :class:`hyuav.learning.targets.RaisedTD0`.
         """
         loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
-        if self.return_bound or alternative is not None:
+        if alternative is not None:
             plain = loss.value_estimator
             raised = RaisedTD0(
-                learners=learners,
                 alternative=alternative,
-                bound=self.return_bound,
-                decay=self.return_bound_decay,
                 gamma=self.discount,
                 value_network=plain.value_network,
             )
@@ -222,10 +205,6 @@ class Algorithm:
     def restarts(self, episode: int) -> bool:
         """Whether actors go back to their best weights after this episode's evaluation."""
         return 0 < self.parameters.restart_after <= episode
-
-    def recency(self, episode: int) -> float:
-        """Power of the ages of the transitions drawn in an episode."""
-        return self.parameters.recency if self.restarts(episode) else 1.0
 
     def repeats(self, episode: int) -> bool:
         """Whether an episode, from 1, is the best flight so far once more."""

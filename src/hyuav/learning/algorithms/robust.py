@@ -29,9 +29,6 @@ class Robust(AlgorithmParameters):
     warm_up_episodes: int = parameter(count(0), 100)
     repeat_every: int = parameter(count(0), 4)
     restart_after: int = parameter(count(0), 200)
-    recency: float = parameter(number(1.0), 3.0)
-    return_bound: float = parameter(number(0.0, 1.0), 0.3)
-    return_bound_decay: float = parameter(number(0.0, 1.0), 0.999)
     control_variate: bool = parameter(switch, True)
 
 

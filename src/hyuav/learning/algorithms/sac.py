@@ -93,7 +93,7 @@ class SAC(AlgorithmParameters):
             reduction="none",
             scalar_output_mode="exclude",
         )
-        self.estimate_values(loss, learners)
+        self.estimate_values(loss)
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         actor_optimizer.add_param_group(
@@ -109,7 +109,7 @@ class SAC(AlgorithmParameters):
             actor=TensorDictSequential(distribution, mean),
             explorer=explorer,
             loss=loss,
-            best_flights=BestFlights(learners, scenario),
+            best_flights=BestFlights(learners, scenario, self.observation_size(scenario)),
             steps=(
                 GradientStep(
                     "critic",
