@@ -4,9 +4,10 @@ import importlib.util
 import os
 import re
 import sys
+import traceback
 from pathlib import Path
 
-from hyuav.errors import InputError, InputTypeError, rejection
+from hyuav.errors import InputError, InputTypeError, one_line, rejection
 from hyuav.learning.algorithms.base import AlgorithmParameters
 from hyuav.learning.algorithms.ddpg import DDPG
 from hyuav.learning.algorithms.robust import RobustDDPG, RobustTD3
@@ -67,13 +68,25 @@ def run_own_files(paths: str) -> None:
         paths: of the files, joined as in PATH.
 
     Raises:
-        InputError: there is no such file.
+        InputError: there is no such file, or it fails; its error is the cause.
     """
     for path in filter(None, paths.split(os.pathsep)):
-        file = Path(path)
-        spec = importlib.util.spec_from_file_location(f"hyuav_own_{file.stem}", file)
-        if spec is None or spec.loader is None or not file.is_file():
+        spec = importlib.util.spec_from_file_location(f"hyuav_own_{Path(path).stem}", path)
+        if spec is None or spec.loader is None or not os.path.isfile(path):  # noqa: PTH113
             raise InputError(rejection(OWN_FILES, path, "a Python file"))
         module = importlib.util.module_from_spec(spec)
         sys.modules[spec.name] = module  # where dataclasses and pickle look for it
-        spec.loader.exec_module(module)
+        try:
+            spec.loader.exec_module(module)
+        except (Exception, SystemExit) as error:
+            del sys.modules[spec.name]
+            accepted = f"a Python file that runs ({_failure(error, path)})"
+            raise InputError(rejection(OWN_FILES, path, accepted)) from error
+
+
+def _failure(error: BaseException, path: str) -> str:
+    """What went wrong, and in which of the file's lines."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if frame.filename == str(Path(path).absolute())]
+    where = f"line {lines[-1]}: " if lines else ""
+    return one_line(f"{where}{type(error).__name__}: {error}")
