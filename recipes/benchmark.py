@@ -6,6 +6,8 @@ python recipes/benchmark.py parts=training learners=[1,10,30] seconds=20
 python recipes/benchmark.py quick=true
 """
 
+import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+
 from pathlib import Path
 
 from rich.console import Console

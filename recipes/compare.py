@@ -7,6 +7,8 @@ python recipes/compare.py output=runs/NAME
 python recipes/compare.py learners=1000 engine=ray address=auto
 """
 
+import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+
 import sys
 from functools import partial
 from pathlib import Path

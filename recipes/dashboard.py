@@ -5,6 +5,8 @@ python recipes/dashboard.py
 python recipes/dashboard.py runs=runs port=8600
 """
 
+import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+
 from pathlib import Path
 
 from hyuav.configuration import Config, recipe, section

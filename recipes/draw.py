@@ -4,6 +4,8 @@ python recipes/draw.py run=runs/NAME
 python recipes/draw.py run=runs/NAME figures=[trajectories,animation]
 """
 
+import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+
 from dataclasses import dataclass
 from pathlib import Path
 

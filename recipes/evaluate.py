@@ -5,6 +5,8 @@ python recipes/evaluate.py run=[runs/HYBRID,runs/RELAY,runs/JAMMING]
 python recipes/evaluate.py run=runs/NAME num_slots=10
 """
 
+import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,6 +4,8 @@ python recipes/report.py run=runs/NAME
 python recipes/report.py run=[runs/ONE,runs/OTHER]
 """
 
+import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -9,6 +9,8 @@ python recipes/reproduce.py figures=[learning_curves,trajectories]
 python recipes/reproduce.py hydra.run.dir=runs/NAME
 """
 
+import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+
 import dataclasses
 import sys
 from collections.abc import Callable, Mapping, Sequence

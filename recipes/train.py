@@ -5,6 +5,8 @@ python recipes/train.py scheme=[hybrid,relay,jamming] num_slots=[10,20] learners
 python recipes/train.py resume=runs/NAME
 """
 
+import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+
 from dataclasses import dataclass
 from pathlib import Path
 

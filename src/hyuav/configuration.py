@@ -1,5 +1,7 @@
 """Hydra for the recipes: typed defaults by name, and one line for every mistake."""
 
+from hyuav_start import loaded
+
 import argparse
 import dataclasses
 import logging
@@ -123,6 +125,7 @@ def recipe(
             register(groups)
             one_line = mock.patch.object(argparse.ArgumentParser, "print_usage")
             try:
+                loaded()  # from here on an interruption is answered below
                 with one_line:
                     hydra.main(version_base=None, config_path=None, config_name=name)(run)()
             except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:

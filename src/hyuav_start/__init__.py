@@ -1,0 +1,39 @@
+"""What a recipe imports before all else, so that it ends in one line while it is still loading.
+
+Loading takes seconds, in which nothing is done that would have to be kept. Until :func:`loaded`,
+Ctrl-C therefore ends the program at once, with status 130; in the worker of a program it does
+nothing, since the program ends its workers. An ``InputError`` that nobody answers, such as that of
+a user's own algorithm while ``hyuav`` is imported, ends it with status 2.
+"""
+
+import multiprocessing
+import os
+import signal
+import sys
+from types import FrameType, TracebackType
+
+
+def loaded() -> None:
+    """From now on Ctrl-C raises KeyboardInterrupt again."""
+    if signal.getsignal(signal.SIGINT) is _end:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(128 + number)  # an exception could be lost in what is being loaded
+
+
+def _tell(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
+    errors = sys.modules.get("hyuav.errors")  # importing it here could raise the same again
+    if errors is None or not isinstance(error, errors.InputError):
+        sys.__excepthook__(kind, error, traceback)
+        return
+    print(f"error: {error}", file=sys.stderr)
+    sys.exit(2)
+
+
+sys.excepthook = _tell
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored
+    is_worker = multiprocessing.parent_process() is not None
+    signal.signal(signal.SIGINT, signal.SIG_IGN if is_worker else _end)
