@@ -1,11 +1,21 @@
-"""Disks that are full or read-only, really: a small one is mounted where the system allows it."""
+"""Real faults: disks that are full or read-only, and losses that are no longer finite.
+
+A small disk is mounted where the system allows it.
+"""
 
 import contextlib
+import itertools
 import resource
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+
+from rich.console import Console
+
+from hyuav.experiment import new_training
+from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.tracking import LoggerParameters, Tracker
 
 MEGABYTE = 2**20
 
@@ -82,3 +92,28 @@ def _no_file_may_grow() -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def leave_overflowing(
+    directory: Path, configuration: RunConfiguration, flown: int, learners: Sequence[int]
+) -> None:
+    """An interrupted training in which the squares of some critics' losses will be beyond a float.
+
+    Args:
+        directory: of the training.
+        configuration: of the training, in one cohort.
+        flown: episodes before it was interrupted.
+        learners: whose critics they are.
+    """
+    training = new_training(configuration)
+    run = RunDirectory.create(directory, configuration)
+    silent = LoggerParameters(mode="disabled"), Console(quiet=True)
+    with Tracker(run, configuration, training, *silent) as tracker:
+        for episode in itertools.islice(training.episodes(), flown):
+            tracker.log(episode)
+        (cohort,) = training.cohorts
+        for name, values in cohort.algorithm.loss.state_dict().items():
+            if "value_network" in name:
+                for learner in learners:
+                    values.select(-min(values.ndim, 3), learner).mul_(1e25)
+        tracker.save()

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
+from faults import leave_overflowing
 from hyuav import Scenario
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.plan import PEER, parameters_of, training_episodes
@@ -166,6 +167,30 @@ def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: 
         pd.testing.assert_frame_equal(
             kept.drop(columns=clock), expected.drop(columns=clock), check_exact=True
         )
+
+
+@pytest.mark.parametrize(("flown", "learners"), [(0, [1]), (3, [1]), (3, [0, 1, 2, 3])])
+def test_learners_that_stop_count_with_their_last_good_weights(
+    optima: Optima, tmp_path: Path, flown: int, learners: list[int]
+) -> None:
+    whole, work = shard(optima, tmp_path / "whole"), shard(optima, tmp_path / "stopped")
+    whole.run()
+    partial = tmp_path / "stopped" / f"{work.name}.partial"
+    leave_overflowing(partial, work.configuration, flown, learners)
+    work.run()
+    results, expected = (pd.read_parquet(own.path / "results.parquet") for own in (work, whole))
+    stopped = results.index.isin(learners)
+    assert results["stopped"].isna().tolist() == [not own for own in stopped]
+    assert (results.loc[stopped, "stopped"] > flown).all()
+    assert expected["stopped"].isna().all()
+    clock = ["seconds", "seconds_to_threshold"]
+    kept, others = (own[~stopped].drop(columns=clock) for own in (results, expected))
+    pd.testing.assert_frame_equal(kept, others, check_exact=True, check_dtype=False)
+    curves = pd.read_parquet(work.path / "curves.parquet")
+    for _, learner in results[stopped].iterrows():
+        assert np.isfinite(learner["sum_rate"])
+        own = curves[(curves["scheme"] == learner["scheme"]) & (curves["seed"] == learner["seed"])]
+        assert own["episode"].tolist() == ([2] if flown else [])
 
 
 @pytest.mark.parametrize("left", ["another", "nothing", "damaged"])

@@ -131,3 +131,12 @@ def test_learning_curves_are_means_at_each_evaluation() -> None:
     assert curve["iqm"].tolist() == [0.5, 1.0]
     assert (curve["low"] < curve["iqm"]).all()
     assert (curve["high"] > curve["iqm"]).all()
+
+
+def test_a_learner_that_stopped_stays_at_its_best_in_learning_curves() -> None:
+    first, second = learners("ddpg", [0.2, 0.4]), learners("ddpg", [0.3, 0.8])
+    rows = [first.assign(episode=10), second[:1].assign(episode=20)]
+    curve = learning_curves(pd.concat(rows))
+    assert curve["episode"].tolist() == [10, 20]
+    assert curve["iqm"].tolist() == pytest.approx([0.3, 0.35])
+    assert learning_curves(pd.concat(rows)[:0]).empty

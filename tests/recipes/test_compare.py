@@ -1,13 +1,16 @@
 """The comparison's recipe as a user calls it, at a size that is small enough for a test."""
 
 import json
+import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from faults import leave_overflowing
 from hyuav.benchmark import plan
 from hyuav.learning.algorithms import RobustDDPG
 from hyuav.runs import RunDirectory
@@ -98,6 +101,31 @@ def test_a_shard_that_fails_is_named_and_tried_again(
     call("compare", *TWO)
     results = pd.read_parquet(tmp_path / "here" / "results.parquet")
     assert set(results["algorithm"]) == {"ddpg", "sac"}
+
+
+@pytest.mark.parametrize(("flown", "learners"), [(0, range(4)), (2, [3])])
+def test_learners_that_stop_are_named_with_what_their_last_good_weights_earn(
+    call: Call, tmp_path: Path, capsys: Printed, flown: int, learners: Sequence[int]
+) -> None:
+    shard = tmp_path / "here" / "shards" / "ddpg_two_clusters_T8"
+    one = ["algorithm=ddpg", *TWO[1:], "training.cohorts=1"]
+    call("compare", *one)
+    configuration = RunDirectory(shard).configuration()
+    shutil.rmtree(shard)
+    leave_overflowing(shard.with_name(f"{shard.name}.partial"), configuration, flown, learners)
+    capsys.readouterr()
+    call("compare", *one)
+    printed = capsys.readouterr()
+    lines = [line for line in printed.out.splitlines() if "stopped in episode" in line]
+    results = pd.read_parquet(tmp_path / "here" / "results.parquet")
+    assert len(lines) == len(learners) == results["stopped"].notna().sum()
+    for line, learner in zip(lines, learners, strict=True):
+        own = results.iloc[learner]
+        assert line.startswith(f"DDPG, two_clusters, T = 8, {own['scheme']}, seed {own['seed']} ")
+        assert line.endswith(f" count: {100 * own['fraction']:.1f} % of the optimum")
+    assert len(printed.err.splitlines()) == len(learners)
+    call("compare", *one)
+    assert capsys.readouterr().out == printed.out
 
 
 def test_shards_of_random_layouts_and_of_a_peer_train_in_processes(

@@ -47,7 +47,8 @@ def draw(summary: Summary, options: Compare, directory: Path) -> None:
     results, threshold = summary.results, options.threshold
     save_figure(cell_means(summary.cells), directory, "cells")
     curves = learning_curves(summary.curves)
-    save_figure(curves_figure(curves, threshold), directory, "learning_curves")
+    if len(curves):
+        save_figure(curves_figure(curves, threshold), directory, "learning_curves")
     lowest = max(math.floor(20 * results["fraction"].min()) / 20, 0.0)
     profiles = performance_profiles(results, np.linspace(min(lowest, 0.95), 1.0, 101))
     save_figure(profiles_figure(profiles, threshold), directory, "performance_profiles")

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -155,8 +156,7 @@ class ComparisonDirectory:
         if not finished:
             return None
         results, curves = (
-            pd.concat([pd.read_parquet(path / name) for path in finished], ignore_index=True)
-            for name in (RESULTS_FILE, CURVES_FILE)
+            _joined([path / name for path in finished]) for name in (RESULTS_FILE, CURVES_FILE)
         )
         threshold = self.options.threshold
         on_layouts = results[in_cells(results)["scenario"] == LAYOUTS]
@@ -168,6 +168,12 @@ class ComparisonDirectory:
             summarize_algorithms(on_layouts, threshold),
             improvements(results),
         )
+
+
+def _joined(files: Sequence[Path]) -> pd.DataFrame:
+    """The rows of all tables; one without rows tells nothing of its columns' types."""
+    tables = [pd.read_parquet(file) for file in files]
+    return pd.concat([own for own in tables if len(own)] or tables, ignore_index=True)
 
 
 def _entries(config: Config) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.plan import PEER, training_episodes
-from hyuav.errors import InputError
+from hyuav.errors import Halted, InputError
 from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
 from hyuav.experiment import LEARNED, learned_policies, resume, train
 from hyuav.runs import RunConfiguration, RunDirectory
@@ -68,7 +68,8 @@ class Shard:
             partial.mkdir(parents=True)
             metrics, sum_rates = stable_baselines.train(self.configuration, self.evaluation)
         else:
-            metrics, sum_rates = _reached(self, _go_on(self, partial) or _begin(self, partial))
+            _train(self, partial)
+            metrics, sum_rates = _reached(self, RunDirectory(partial))
         results, curves = tables(self, metrics, sum_rates)
         results.to_parquet(partial / RESULTS_FILE)
         curves.to_parquet(partial / CURVES_FILE)
@@ -80,20 +81,27 @@ def _clear(directory: Path) -> None:
         shutil.rmtree(directory)
 
 
-def _begin(shard: Shard, directory: Path) -> RunDirectory:
-    _clear(directory)
-    return train(directory, shard.configuration, *_reporting(shard), logs=_logs(shard))
+def _train(shard: Shard, directory: Path) -> None:
+    """To the end of all learners, be it that all have stopped; their best weights are kept."""
+    try:
+        if not _go_on(shard, directory):
+            _clear(directory)
+            train(directory, shard.configuration, *_reporting(shard), logs=_logs(shard))
+    except Halted as halted:
+        if halted.resumable:
+            raise
 
 
-def _go_on(shard: Shard, directory: Path) -> RunDirectory | None:
-    """The training that a broken attempt left, to its end; None where it is of no use."""
+def _go_on(shard: Shard, directory: Path) -> bool:
+    """Bring the training that a broken attempt left to its end; False where it is of no use."""
     run = RunDirectory(directory)
     try:
         if _comparable(run.configuration()) != _comparable(shard.configuration):
-            return None
-        return resume(directory, *_reporting(shard), logs=_logs(shard))
+            return False
+        resume(directory, *_reporting(shard), logs=_logs(shard))
     except InputError:  # no checkpoint yet, or one that cannot be read
-        return None
+        return False
+    return True
 
 
 def _comparable(configuration: RunConfiguration) -> RunConfiguration:
@@ -113,9 +121,9 @@ def _logs(shard: Shard) -> Path:
 
 
 def _reached(shard: Shard, run: RunDirectory) -> tuple[pd.DataFrame, list[float]]:
-    """A training's evaluations, and the best actors' sum-rates in bps/Hz."""
+    """A training's metrics, and the best actors' sum-rates in bps/Hz."""
     configuration, scenario = shard.configuration, shard.configuration.scenario
-    metrics = run.metrics().dropna(subset="evaluation")
+    metrics = run.metrics()
     metrics["seconds"] /= len(configuration.learners)
     earned: dict[str, list[float]] = {
         scheme: fly(scenario, scheme, policy, shard.evaluation)
@@ -134,10 +142,11 @@ def tables(
 
     Args:
         shard: whose learners they are.
-        metrics: a row for each evaluation in training and learner: ``learner``, ``episode``,
-            ``slots``, ``evaluation`` and its ``sum_rate`` in bps/Hz, and ``seconds``, those that
-            passed since training began, with compiling and evaluating, divided by the learners
-            that trained side by side.
+        metrics: a row for each evaluation in training and learner, or for each episode, of which
+            some are evaluated: ``learner``, ``episode``, ``slots``, ``evaluation`` and its
+            ``sum_rate`` in bps/Hz, and ``seconds``, those that passed since training began, with
+            compiling and evaluating, divided by the learners that trained side by side. A learner
+            has rows until it stops.
         sum_rates: in bps/Hz, what each learner's best weights earn in the evaluation's episodes.
 
     Returns:
@@ -145,9 +154,10 @@ def tables(
         same episodes, and their ratio ``fraction``; ``episodes_to_threshold`` and
         ``seconds_to_threshold`` at the first evaluation at which the best weights so far earned
         the threshold's share of what the optimum earns in that evaluation's episodes, NaN where
-        none did; and ``seconds`` in all.
-        ``curves``, a row for each row of ``metrics``, with ``best_sum_rate``, what the best
-        weights so far earned, and its ``fraction`` of the optimum in the same episodes.
+        none did; ``seconds`` in all; and ``stopped``, the episode in which the learner stopped for
+        want of finite numbers, NaN for those that did not.
+        ``curves``, a row for each evaluation, with ``best_sum_rate``, what the best weights so far
+        earned, and its ``fraction`` of the optimum in the same episodes.
     """
     configuration, learners = shard.configuration, shard.configuration.learners
     schemes = dict.fromkeys(own.scheme for own in learners)
@@ -164,7 +174,9 @@ def tables(
             "seed": learner.seed,
         }
         columns = ["episode", "slots", "seconds", "evaluation", "sum_rate"]
-        curve = metrics[metrics["learner"] == index][columns].reset_index(drop=True)
+        own = metrics[metrics["learner"] == index]
+        last = int(own["episode"].iloc[-1]) if len(own) else 0
+        curve = own[columns].dropna(subset="evaluation").reset_index(drop=True)
         is_best = curve["evaluation"] > curve["evaluation"].cummax().shift(fill_value=-np.inf)
         curve["best_sum_rate"] = curve["sum_rate"].where(is_best).ffill()
         curve["fraction"] = curve["best_sum_rate"] / in_training[learner.scheme]
@@ -178,7 +190,8 @@ def tables(
                 "fraction": sum_rate / optimum,
                 "episodes_to_threshold": solved["episode"].iloc[0] if len(solved) else np.nan,
                 "seconds_to_threshold": solved["seconds"].iloc[0] if len(solved) else np.nan,
-                "seconds": curve["seconds"].iloc[-1],
+                "seconds": own["seconds"].iloc[-1] if len(own) else 0.0,
+                "stopped": last + 1.0 if last < configuration.training.num_episodes else np.nan,
             }
         )
         curves.append(curve.assign(**identity)[[*identity, *curve.columns]])

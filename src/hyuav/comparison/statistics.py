@@ -168,6 +168,8 @@ def _mean_improvement(samples: Sequence[Array]) -> Any:
 def learning_curves(curves: pd.DataFrame) -> pd.DataFrame:
     """The interquartile mean over all learners of an algorithm, evaluation by evaluation.
 
+    A learner that stopped stays at its best; without an evaluation before that, it has no part.
+
     Args:
         curves: a row for each learner and evaluation, as :func:`hyuav.comparison.shards.tables`
             gives them.
@@ -177,15 +179,21 @@ def learning_curves(curves: pd.DataFrame) -> pd.DataFrame:
         ``high``.
     """
     means = []
-    for algorithm, own in in_cells(curves).groupby("algorithm", sort=False):
+    curves = in_cells(curves.assign(layout=curves["scenario"]))
+    for algorithm, own in curves.groupby("algorithm", sort=False):
+        episodes = np.unique(own["episode"])
         cells = [
-            np.stack(cell.groupby("episode")["fraction"].apply(np.asarray).to_list())
+            cell.pivot_table("fraction", "episode", ["layout", "seed"], aggfunc="last")
+            .reindex(episodes)
+            .ffill()
+            .to_numpy()
             for _, cell in own.groupby(_CELL, sort=False)
         ]
         low, high = stratified_interval(cells, interquartile_mean)
         columns = {"iqm": interquartile_mean(cells), "low": low, "high": high}
-        episodes = np.unique(own["episode"])
         means.append(pd.DataFrame({"algorithm": algorithm, "episode": episodes, **columns}))
+    if not means:  # every learner stopped before its first evaluation
+        return pd.DataFrame(columns=["algorithm", "episode", "iqm", "low", "high"])
     return pd.concat(means, ignore_index=True)
 
 

@@ -11,6 +11,7 @@ from rich.table import Table
 from hyuav.comparison.directory import Summary
 from hyuav.comparison.plan import PEER
 from hyuav.comparison.statistics import NEAR_OPTIMAL
+from hyuav.metrics import finite_numbers
 from hyuav.terminal import print_table, results_table
 
 
@@ -25,8 +26,27 @@ def label(entry: str) -> str:
     return " ".join([acronym.upper(), *rest])
 
 
+def stopped(results: pd.DataFrame) -> list[str]:
+    """A line for each learner that stopped for want of finite numbers.
+
+    Args:
+        results: a row for each learner, as :func:`hyuav.comparison.shards.tables` gives them; those
+            of older comparisons do not tell who stopped.
+    """
+    if "stopped" not in results:
+        return []
+    episodes = finite_numbers(results["stopped"])
+    return [
+        f"{label(str(row['algorithm']))}, {row['scenario']}, T = {row['num_slots']}, "
+        f"{row['scheme']}, seed {row['seed']} stopped in episode {episodes[index]:.0f}, its losses "
+        f"or weights not finite; its best weights before that count: {100 * row['fraction']:.1f} % "
+        "of the optimum"
+        for index, row in results[episodes.notna()].iterrows()
+    ]
+
+
 def print_tables(summary: Summary, threshold: float, console: Console) -> None:
-    """Print the cells of each scenario and horizon, then what is told of each algorithm.
+    """Print the cells of each scenario and horizon, what is told of each algorithm, who stopped.
 
     Args:
         summary: of the comparison.
@@ -42,6 +62,8 @@ def print_tables(summary: Summary, threshold: float, console: Console) -> None:
         print_table(_algorithms("Random layouts", summary.layouts, threshold), console)
     if len(summary.improvements):
         print_table(_improvements(summary.improvements), console)
+    for line in stopped(summary.results):
+        console.print(line, soft_wrap=True, markup=False, highlight=False)
 
 
 def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:

@@ -9,7 +9,7 @@ import pandas as pd
 from hyuav.comparison.plan import LAYOUT
 from hyuav.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.comparison.statistics import summarize_algorithms, summarize_cells
-from hyuav.comparison.tables import label
+from hyuav.comparison.tables import label, stopped
 from hyuav.errors import InputError
 from hyuav.evaluation import LABELS, EvaluationParameters, evaluate
 from hyuav.experiment import learned_policies
@@ -84,7 +84,7 @@ def _results(
         yield Section(title, (), [Picture(name, {"": figure}, int(figure.layout.height))])
     algorithms = summarize_algorithms(results, threshold)
     tables = [algorithms_table(algorithms, threshold), cells_table(cells, threshold)]
-    yield Section("Results", (), (), tables)
+    yield Section("Results", stopped(results), (), tables)
 
 
 def _trained(directory: Path) -> Iterator[tuple[str, RunDirectory, RunConfiguration]]:
