@@ -5,6 +5,7 @@ import importlib.util
 import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
+from unittest import mock
 
 from hyuav.errors import InputError, rejection
 
@@ -22,9 +23,6 @@ _ENVIRONMENT = {
     "RAY_COLOR_PREFIX": "0",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # as will be Ray's default, of which it warns
 }
-
-_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
-"""By which Ray listens on the loopback alone, on every system; read when it is imported."""
 
 Piece = TypeVar("Piece")
 
@@ -52,7 +50,7 @@ def connected(address: str, workers: int, *, prints: bool) -> Iterator[None]:
         InputError: Ray cannot be imported, or there is none at the address.
     """
     require_ray()
-    for name, value in (_ENVIRONMENT | (_LOOPBACK if address == LOCAL else {})).items():
+    for name, value in _ENVIRONMENT.items():
         os.environ.setdefault(name, value)
     import ray  # reads the environment
 
@@ -60,11 +58,28 @@ def connected(address: str, workers: int, *, prints: bool) -> Iterator[None]:
     if address == LOCAL:
         options |= {"num_cpus": workers, "include_dashboard": False}
         options["object_store_memory"] = OBJECT_STORE_BYTES
-    try:
-        _connect(address, options)
+    with _loopback_alone() if address == LOCAL else contextlib.nullcontext():
+        try:
+            _connect(address, options)
+            yield
+        finally:
+            ray.shutdown()
+
+
+@contextlib.contextmanager
+def _loopback_alone() -> Iterator[None]:
+    """A Ray that is started meanwhile listens there, as Ray does on Windows and macOS.
+
+    Ray reads the switch for it when it is imported, which TorchRL has done by then.
+    """
+    from ray._private import ray_constants
+
+    switch = {ray_constants.ENABLE_RAY_CLUSTERS_ENV_VAR: "0"}  # for the processes that it starts
+    with (
+        mock.patch.dict(os.environ, switch),
+        mock.patch.object(ray_constants, "ENABLE_RAY_CLUSTER", False),
+    ):
         yield
-    finally:
-        ray.shutdown()
 
 
 def _connect(address: str, options: dict[str, Any]) -> None:

@@ -35,13 +35,13 @@ def stopped(results: pd.DataFrame) -> list[str]:
     """
     if "stopped" not in results:
         return []
-    episodes = finite_numbers(results["stopped"])
+    told = results.assign(stopped=finite_numbers(results["stopped"])).dropna(subset="stopped")
     return [
         f"{label(str(row['algorithm']))}, {row['scenario']}, T = {row['num_slots']}, "
-        f"{row['scheme']}, seed {row['seed']} stopped in episode {episodes[index]:.0f}, its losses "
+        f"{row['scheme']}, seed {row['seed']} stopped in episode {row['stopped']:.0f}, its losses "
         f"or weights not finite; its best weights before that count: {100 * row['fraction']:.1f} % "
         "of the optimum"
-        for index, row in results[episodes.notna()].iterrows()
+        for _, row in told.iterrows()
     ]
 
 
