@@ -21,6 +21,12 @@ def cohort(**hyperparameters: Any) -> Cohort:
     return Cohort(SCENARIO, LEARNERS, algorithm, replay_size=20, batch_size=8, device=None)
 
 
+def best(trained: Cohort) -> BestFlights:
+    """Of each learner."""
+    assert trained.algorithm.best_flights is not None
+    return trained.algorithm.best_flights
+
+
 def flown(trained: Cohort) -> torch.Tensor:
     """The actions (T, N, 2) of the last episode."""
     slots = torch.arange(-SCENARIO.num_slots, 0) + trained.replay.writer._cursor
@@ -38,8 +44,8 @@ def test_every_nth_episode_takes_the_actions_of_each_learners_best(compiled: boo
             trained.compile()
         reward, _ = trained.fly()
         if trained.algorithm.repeats(episode):
-            best = torch.stack(rewards).argmax(dim=0)
-            expected = torch.stack([flights[index][:, n] for n, index in enumerate(best)], dim=1)
+            first = torch.stack(rewards).argmax(dim=0)
+            expected = torch.stack([flights[index][:, n] for n, index in enumerate(first)], dim=1)
             torch.testing.assert_close(flown(trained), expected)
             repeated.append(episode)
         rewards.append(reward)
@@ -66,7 +72,7 @@ def test_the_best_flight_goes_on_with_a_training_that_is_resumed() -> None:
     for trained in (first, second):
         trained.fly()
     assert torch.equal(flown(first), flown(second))
-    assert torch.equal(first.algorithm.best_flights.reward, second.algorithm.best_flights.reward)
+    assert torch.equal(best(first).reward, best(second).reward)
 
 
 def test_the_best_flights_are_joined_at_once_or_as_soon_as_possible() -> None:
@@ -86,7 +92,7 @@ def test_the_way_of_the_best_flight_is_kept_with_its_actions() -> None:
     trained = cohort(repeat_every=3)
     for _ in range(4):
         trained.fly()
-    flights, scale = trained.algorithm.best_flights, SCENARIO.max_speed / 100.0
+    flights, scale = best(trained), SCENARIO.max_speed / 100.0
     way = flights.observations[..., :2]
     start = torch.tensor(SCENARIO.helper_start) / 100.0
     before = torch.cat([start.expand(1, 3, 2), way[:-1]])

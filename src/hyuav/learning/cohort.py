@@ -12,7 +12,7 @@ from torchrl.collectors import Collector
 
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.repetition import as_planned
+from hyuav.learning.repetition import BestFlights, as_planned
 from hyuav.learning.replay import clear_unused, forget, latest, make_replay
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import (
@@ -126,13 +126,15 @@ class Cohort:
     def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
         with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
             tensordict = self.algorithm.explorer(tensordict)
-        if not self.algorithm.parameters.repeat_every:
+        if not self.algorithm.repeats(self.episode):
             return tensordict
         return as_planned(tensordict, self._plan()[int(tensordict["step_count"][0])])
 
     def _plan(self) -> Tensor:
         """Actions (T, N, 2) that are taken whatever the explorer says, NaN where there are none."""
-        planned = self.algorithm.best_flights.actions
+        flights = self.algorithm.best_flights
+        assert flights is not None
+        planned = flights.actions
         return planned if self.algorithm.repeats(self.episode) else planned * torch.nan
 
     @property
@@ -172,18 +174,18 @@ class Cohort:
         self.episode += 1
         self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
-        if self.algorithm.parameters.keeps_flights:
-            self._keep_flight()
+        if self.algorithm.best_flights is not None:
+            self._keep_flight(self.algorithm.best_flights)
         self._stop_where_not_finite(*flown)
         return flown
 
-    def _keep_flight(self) -> None:
+    def _keep_flight(self, flights: BestFlights) -> None:
         """Keep the episode's flight where it is the best so far.
 
         It counts what it earned; or where it is known, what is to be expected of it.
         """
         flown = self.replay.storage._storage[latest(self.replay, self.scenario.num_slots)]
-        flights, variate = self.algorithm.best_flights, self.algorithm.control_variate
+        variate = self.algorithm.control_variate
         reward = flown["next", "reward"].sum(dim=(0, 2))
         if variate is not None:
             reward = variate.expected(flown["next", "observation"])

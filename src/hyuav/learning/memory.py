@@ -36,11 +36,13 @@ def require_memory(
         InputError: naming what takes most, and how much there is.
     """
     learners, observed = len(horizons), num_ues + 6
-    layers = (observed + 2, *algorithm.hidden_sizes, 2)
+    faded = (3 * num_ues + 2) * algorithm.control_variate
+    inputs = 2 * observed if algorithm.afterstate else observed + 2
+    layers = (inputs, *algorithm.hidden_sizes, 2)
     widths = sum(layers)
     needed = {
         "hidden_sizes": learners * COPIES * sum((low + 1) * high for low, high in pairwise(layers)),
-        "replay_size": learners * sizes["replay_size"] * (2 * observed + 6),
+        "replay_size": learners * sizes["replay_size"] * (2 * observed + 6 + faded),
         "batch_size": learners * sizes["batch_size"] * 2 * widths,
         "evaluation_episodes": learners * sizes["evaluation_episodes"] * 4 * observed,
         "num_slots": 4 * sum(horizons),

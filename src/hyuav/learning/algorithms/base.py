@@ -90,6 +90,9 @@ class AlgorithmParameters(Parameters, ABC):
             warm_up = WarmUp(learners, self.warm_up_episodes, scenario)
             explorer = TensorDictSequential(algorithm.explorer, warm_up)
             algorithm = replace(algorithm, explorer=explorer)
+        if self.keeps_flights and algorithm.best_flights is None:
+            flights = BestFlights(learners, scenario, self.observation_size(scenario))
+            algorithm = replace(algorithm, best_flights=flights)
         if self.control_variate:
             variate = ControlVariate(learners, scenario, self.reward_scale, clock=self.clock)
             optimizer = adam(variate, VARIATE_LEARNING_RATE)
@@ -181,14 +184,14 @@ class Algorithm:
     """Writes the ``action`` to take in training."""
     loss: LossModule
     """TorchRL's loss, which holds the networks' and the target networks' weights."""
-    best_flights: BestFlights
-    """Of each learner."""
     steps: tuple[GradientStep, ...]
     """Taken in this order in every update."""
     target: SoftUpdate
     """theta' <- tau theta + (1 - tau) theta'."""
     target_every: int = 1
     """The targets follow in every n-th update."""
+    best_flights: BestFlights | None = None
+    """Of each learner, where they are of use."""
     control_variate: ControlVariate | None = None
     """What takes the luck of the fading off the rewards of a mini-batch, if any."""
 
@@ -259,11 +262,9 @@ class Algorithm:
     @property
     def modules(self) -> nn.ModuleDict:
         """All weights and buffers that training changes."""
-        modules = {
-            "loss": self.loss,
-            "explorer": self.explorer,
-            "best_flights": self.best_flights,
-        }
+        modules = {"loss": self.loss, "explorer": self.explorer}
+        if self.best_flights is not None:
+            modules["best_flights"] = self.best_flights
         if self.control_variate is not None:
             modules["control_variate"] = self.control_variate
         return nn.ModuleDict(modules)

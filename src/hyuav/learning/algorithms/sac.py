@@ -21,7 +21,6 @@ from hyuav.learning.algorithms.base import (
     learning_rate,
 )
 from hyuav.learning.networks import LearnerMLP
-from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import number, parameter
 from hyuav.scenario import Scenario
 
@@ -109,7 +108,6 @@ class SAC(AlgorithmParameters):
             actor=TensorDictSequential(distribution, mean),
             explorer=explorer,
             loss=loss,
-            best_flights=BestFlights(learners, scenario, self.observation_size(scenario)),
             steps=(
                 GradientStep(
                     "critic",
