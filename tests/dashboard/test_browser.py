@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
-from browser import DESKTOP, PHONE, BrowserPage, browser, needs_chromium, window
+from browser import DESKTOP, PATIENCE, PHONE, BrowserPage, browser, needs_chromium, window
 from dashboard_runs import write_run
 from dashboard_server import dashboard, recipe
 from hyuav.dashboard.draft import load
@@ -97,6 +97,24 @@ def test_runs_are_found_and_compared_and_their_curves_changed(opened: BrowserPag
     smoothing.press("ArrowRight")
     expect(smoothing).to_have_value("26")
     expect(page.get_by_role("heading", name="What sets these runs apart")).to_be_visible()
+
+
+def test_a_slow_browser_keeps_the_runs_that_are_drawn(
+    context: BrowserContext, address: str
+) -> None:
+    with window(context, *DESKTOP) as opened:
+        page = opened.page
+        slowed = context.new_cdp_session(page)
+        slowed.send("Emulation.setCPUThrottlingRate", {"rate": 5})
+        with page.expect_websocket() as connected:
+            page.goto(address)
+        expect(page.get_by_text("Runs to draw")).to_be_visible()
+        for _ in range(3):  # renewals, each of which tells what the browser holds as chosen
+            connected.value.wait_for_event("framesent", timeout=PATIENCE)
+        expect(page.locator(".js-plotly-plot .legendtext").first).to_be_visible()
+        rest(page)
+        expect(page.get_by_text("Choose options")).to_have_count(0)
+        assert opened.errors == []
 
 
 @WIDTHS

@@ -28,6 +28,12 @@ MOST_DRAWN = 40
 _ROW, _TABLE = 35, 290
 """Heights in pixels."""
 
+_NAME = 270
+"""Width in pixels of the column of names: that of the names that trainings give themselves."""
+
+_NAME_LETTERS = 40
+"""Of a name on one line; longer ones are wrapped."""
+
 
 def show(index: RunIndex) -> None:
     """The page; while it follows trainings, it is renewed every few seconds."""
@@ -47,8 +53,7 @@ def _page(index: RunIndex) -> None:
     found = _filtered(entries, now)
     running = sum(entry.state(now) == "running" for entry in entries)
     st.caption(f"{len(found)} of {len(entries)} runs, {running} in progress")
-    height = min(_ROW * (len(found) + 1) + 3, _TABLE)
-    st.dataframe(_listing(found, now), hide_index=True, height=height, column_config=_columns())
+    _show_listing(found, now)
     chosen = _chosen(entries, found)
     metrics: dict[str, pd.DataFrame] = {}
     with st.container():  # what comes and goes in here moves no widget below, which would lose keys
@@ -95,6 +100,18 @@ def _keep(key: str, values: list[str]) -> None:
         st.session_state[key] = values
 
 
+def _show_listing(entries: Sequence[RunEntry], now: float) -> None:
+    lines = max((-(-len(entry.name) // _NAME_LETTERS) for entry in entries), default=1)
+    row = _ROW if lines == 1 else _ROW + 20
+    st.dataframe(
+        _listing(entries, now),
+        hide_index=True,
+        height=min(_ROW + row * len(entries) + 3, _TABLE),
+        row_height=row,
+        column_config=_columns(),
+    )
+
+
 def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
     return pd.DataFrame(
         {
@@ -114,7 +131,7 @@ def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
 def _columns() -> dict[str, Any]:
     column = st.column_config
     return {
-        "run": column.TextColumn("Run", width="medium"),
+        "run": column.TextColumn("Run", width=_NAME),
         "state": column.TextColumn("State"),
         "episode": column.TextColumn("Episode"),
         "best": column.NumberColumn(
@@ -141,7 +158,6 @@ def _chosen(entries: Sequence[RunEntry], found: Sequence[RunEntry]) -> list[RunE
         state["drawn"] = [found[0].name]
     key = f"drawn-{state.get('drawings', 0)}"
     kept = [name for name in state.get(key, state.get("drawn", [])) if name in by_name]
-    _keep(key, kept)
     options = list(dict.fromkeys([*kept, *(entry.name for entry in found)]))
     choice, everything = st.columns([4, 1], vertical_alignment="bottom")
     everything.button(
@@ -152,7 +168,11 @@ def _chosen(entries: Sequence[RunEntry], found: Sequence[RunEntry]) -> list[RunE
         help=f"possible for up to {MOST_DRAWN} runs",
         width="stretch",
     )
-    names = choice.multiselect("Runs to draw", options, key=key, max_selections=MOST_DRAWN)
+    # A slow browser misses a value that is set once, when a renewal comes before it is shown;
+    # the default comes with every renewal.
+    names = choice.multiselect(
+        "Runs to draw", options, default=kept, key=key, max_selections=MOST_DRAWN
+    )
     state["drawn"] = names
     return [by_name[name] for name in names]
 
