@@ -1,5 +1,6 @@
 """Learning curves of any runs in one figure, as long as they may be."""
 
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,10 +10,10 @@ import pandas as pd
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from hyuav.evaluation import OPTIMA
+from hyuav.evaluation import LABELS, OPTIMA
 from hyuav.experiment import LEARNED
 from hyuav.intervals import interquartile_mean
-from hyuav.report.style import axis, base_layout, plain, scheme_color, scheme_label
+from hyuav.report.style import axis, base_layout, plain, scheme_color
 
 Values = NDArray[np.float64]
 
@@ -48,6 +49,9 @@ MOST_POINTS = 1000
 
 MOST_SEEDS = 20
 """Thin lines of one run and scheme; the mean is of all learners."""
+
+LETTERS = 36
+"""Of a line of the legend: what a phone has room for."""
 
 FEWEST_FOR_QUARTILES = 4
 """Learners of which the interquartile mean leaves some out."""
@@ -92,7 +96,8 @@ class Curves:
 
 def learned_label(rule: str) -> str:
     """The name of what learns where ``rule`` says who chooses the mode."""
-    return scheme_label(LEARNED.get(rule, rule))
+    scheme = LEARNED.get(rule, rule)
+    return LABELS.get(scheme, scheme)
 
 
 def axes_of(metrics: Mapping[str, pd.DataFrame]) -> dict[str, str]:
@@ -147,19 +152,20 @@ def comparison(
             figure.add_traces(list(_traces(curves, line, several_runs=len(metrics) > 1)))
             optimum = optima.get(run, {}).get(curves.scheme)
             if optimum is not None and choice.y in OF_THE_RETURN and not curves.several_horizons:
-                label = scheme_label(OPTIMA[curves.scheme])
+                label = LABELS[OPTIMA[curves.scheme]]
                 figure.add_hline(
                     y=optimum,
                     line={"color": line["color"], "width": 1, "dash": "dot"},
-                    name=f"{label}, {plain(run)}" if len(metrics) > 1 else label,
+                    name=_lines(f"{label}, {run}" if len(metrics) > 1 else label),
                     showlegend=True,
                 )
+    named = [trace for trace in figure.data if trace.showlegend is not False]
     figure.update_layout(
         **base_layout(),
         xaxis=axis(X_AXES[choice.x], rangemode="tozero"),
         yaxis=axis(axes_of(metrics).get(choice.y, choice.y)),
-        height=460,
-        margin={"l": 8, "r": 12, "t": 12, "b": 8},
+        height=min(460 + 20 * max(len(named) - 4, 0), 760),  # a legend takes up to half of it
+        margin={"l": 8, "r": 24, "t": 12, "b": 8},
         showlegend=True,
         legend={"orientation": "h", "y": -0.2, "yanchor": "top", "x": 0.0},
         uirevision="-".join(("curves", choice.x, choice.y)),  # a zoom outlives new rows
@@ -175,9 +181,9 @@ def _line(choice: Choice, run: int, scheme: int, rule: str) -> dict[str, Any]:
 
 def _traces(curves: Curves, line: dict[str, Any], *, several_runs: bool) -> Iterator[go.Scatter]:
     """All learners' lines as one trace, so that hundreds stay responsive, and their mean."""
-    label = f"{curves.label}, {plain(curves.run)}" if several_runs else curves.label
+    label = f"{curves.label}, {curves.run}" if several_runs else curves.label
     x, count = curves.lines.index.to_numpy(dtype=float), curves.lines.shape[1]
-    group = f"{plain(curves.run)}/{curves.label}"
+    group = f"{curves.run}/{curves.label}"
     if count > 1:
         parts = [
             thinned(x, curves.lines[learner].to_numpy(dtype=float))
@@ -203,9 +209,14 @@ def _traces(curves: Curves, line: dict[str, Any], *, several_runs: bool) -> Iter
         mode="lines+markers" if len(middle_x) == 1 else "lines",
         line={**line, "width": 2},
         legendgroup=group,
-        name=label if count == 1 else f"{label} ({kind} of {count})",
+        name=_lines(label if count == 1 else f"{label} ({kind} of {count})"),
         hovertemplate="%{x:,.6~g}: %{y:.4~g}<extra>%{fullData.name}</extra>",
     )
+
+
+def _lines(label: str) -> str:
+    """A label for the legend, on as many lines as it takes."""
+    return "<br>".join(plain(line) for line in textwrap.wrap(label, LETTERS))
 
 
 def thinned(x: Values, y: Values) -> tuple[Values, Values]:

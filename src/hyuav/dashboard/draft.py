@@ -50,7 +50,7 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 def label(name: str) -> str:
     """A field's name, symbol and unit."""
-    words = name.replace("_", " ")
+    words = name.replace("_to_air", "-to-air").replace("_k_factor", " K-factor").replace("_", " ")
     if words.startswith("ue "):
         words = f"UE {words[3:]}"
     unit = FIELDS[name].metadata["unit"]

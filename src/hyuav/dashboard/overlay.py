@@ -51,13 +51,14 @@ def explorer_map(scenario: Scenario, rule: str, quantity: str) -> go.Figure:
     unit = " (bps/Hz)" if quantity == "rate" else f" (of {scenario.num_ues})"
     figure.data[0].update(colorbar=_colorbar(QUANTITIES[quantity] + unit))
     figure.update_traces(showlegend=False, selector={"type": "contour"})
+    figure.update_yaxes(constraintoward="top")  # on a narrow page the square leaves room below
     figure.add_trace(_start(scenario))
     figure.add_trace(_clickable(scenario))
     figure.for_each_trace(_stay_bright, selector={"type": "scatter"})
     figure.update_layout(
         title=None,
         height=740,
-        margin={"l": 50, "r": 10, "t": 90, "b": 10},
+        margin={"l": 50, "r": 20, "t": 150, "b": 10},
         showlegend=True,
         legend={"orientation": "h", "yref": "container", "y": 1.0, "yanchor": "top", "x": 0.0},
         clickmode="event+select",
@@ -110,8 +111,8 @@ def offloading_counts(scenario: Scenario, rule: str, resolution: float) -> NDArr
 
 
 def _colorbar(title: str) -> dict[str, Any]:
-    below = {"orientation": "h", "x": 0.5, "xanchor": "center", "y": -0.12, "yanchor": "top"}
-    return {"title": {"text": title, "side": "bottom"}, "thickness": 12, "len": 0.9, **below}
+    above = {"orientation": "h", "x": 0.5, "xanchor": "center", "y": 1.01, "yanchor": "bottom"}
+    return {"title": {"text": title, "side": "top"}, "thickness": 12, "len": 0.9, **above}
 
 
 def _flight(scenario: Scenario, scheme: str, rows: pd.DataFrame) -> Iterator[go.Scatter]:

@@ -1,7 +1,7 @@
 """The page of the runs: what there is, what is in progress, and curves of any of them."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -28,11 +28,8 @@ MOST_DRAWN = 40
 _ROW, _TABLE = 35, 290
 """Heights in pixels."""
 
-_NAME = 270
-"""Width in pixels of the column of names: that of the names that trainings give themselves."""
-
-_NAME_LETTERS = 40
-"""Of a name on one line; longer ones are wrapped."""
+_LETTER = 6.5
+"""Width in pixels of a table's letters."""
 
 
 def show(index: RunIndex) -> None:
@@ -53,7 +50,9 @@ def _page(index: RunIndex) -> None:
     found = _filtered(entries, now)
     running = sum(entry.state(now) == "running" for entry in entries)
     st.caption(f"{len(found)} of {len(entries)} runs, {running} in progress")
-    _show_listing(found, now)
+    height = min(_ROW * (len(found) + 1) + 3, _TABLE)
+    columns = _columns([entry.name for entry in found])
+    st.dataframe(_listing(found, now), hide_index=True, height=height, column_config=columns)
     chosen = _chosen(entries, found)
     metrics: dict[str, pd.DataFrame] = {}
     with st.container():  # what comes and goes in here moves no widget below, which would lose keys
@@ -100,18 +99,6 @@ def _keep(key: str, values: list[str]) -> None:
         st.session_state[key] = values
 
 
-def _show_listing(entries: Sequence[RunEntry], now: float) -> None:
-    lines = max((-(-len(entry.name) // _NAME_LETTERS) for entry in entries), default=1)
-    row = _ROW if lines == 1 else _ROW + 20
-    st.dataframe(
-        _listing(entries, now),
-        hide_index=True,
-        height=min(_ROW + row * len(entries) + 3, _TABLE),
-        row_height=row,
-        column_config=_columns(),
-    )
-
-
 def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
     return pd.DataFrame(
         {
@@ -128,10 +115,16 @@ def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
     )
 
 
-def _columns() -> dict[str, Any]:
+def _name_column(names: Iterable[str]) -> Any:
+    """A column as wide as the longest name, since tables cut what is longer."""
+    longest = max(map(len, names), default=0)
+    return st.column_config.TextColumn("Run", width=max(round(_LETTER * longest) + 18, 100))
+
+
+def _columns(names: Iterable[str]) -> dict[str, Any]:
     column = st.column_config
     return {
-        "run": column.TextColumn("Run", width=_NAME),
+        "run": _name_column(names),
         "state": column.TextColumn("State"),
         "episode": column.TextColumn("Episode"),
         "best": column.NumberColumn(
@@ -202,7 +195,8 @@ def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
         st.info("No episode of this quantity is complete yet.")
         return
     st.plotly_chart(figure, key="curves", theme=None, config={"displaylogo": False})
-    st.dataframe(outcomes(metrics, choice), hide_index=True)
+    reached = outcomes(metrics, choice)
+    st.dataframe(reached, hide_index=True, column_config={"Run": _name_column(metrics)})
     if len(metrics) > 1:
         st.subheader("What sets these runs apart", anchor=False)
         try:
