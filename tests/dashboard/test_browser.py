@@ -125,6 +125,7 @@ def test_a_flight_is_played_by_the_slider(opened: BrowserPage, size: tuple[int, 
     plot = page.locator(f".st-key-player-{kind} .js-plotly-plot")
     expect(plot).to_be_visible()
     expect(plot.locator(".gtitle")).to_contain_text("slot 1 of 10")
+    rest(page)
     rail = plot.locator(".slider-rail-touch-rect")
     rail.scroll_into_view_if_needed()
     box = rail.bounding_box()
@@ -158,11 +159,15 @@ def test_a_scenario_is_changed_flown_and_saved(
     choose(page, "Node to move", "eavesdropper (E)")
     across = page.get_by_role("spinbutton", name="x (m)")
     expect(across).to_have_value("80")
+    rest(page)  # or the map could be drawn anew under the click
     plot = page.locator(".js-plotly-plot").first
     plot.scroll_into_view_if_needed()
     box = plot.locator(".nsewdrag").bounding_box()
     assert box is not None
-    page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 0.25 * box["height"])
+    page.mouse.move(box["x"] + 0.25 * box["width"], box["y"] + 0.25 * box["height"])
+    expect(plot.locator(".hovertext").first).to_be_visible()
+    page.mouse.down()
+    page.mouse.up()
     expect(across).not_to_have_value("80")
     choose(page, "Fly the checkpoint of", "tiny")
     expect(page.get_by_test_id("stMetricLabel").nth(1)).to_have_text("Proposed")
