@@ -85,8 +85,8 @@ def run_own_files(paths: str) -> None:
 
 
 def _failure(error: BaseException, path: str) -> str:
-    """What went wrong, and in which of the file's lines."""
+    """What went wrong, and in which file and line; the path may be too long to be shown whole."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if frame.filename == str(Path(path).absolute())]
-    where = f"line {lines[-1]}: " if lines else ""
-    return one_line(f"{where}{type(error).__name__}: {error}")
+    line = f", line {lines[-1]}" if lines else ""
+    return one_line(f"{Path(path).name}{line}: {type(error).__name__}: {error}")
