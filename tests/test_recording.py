@@ -1,8 +1,9 @@
 import pytest
 import torch
 from torch import Tensor
+from torch.fx.experimental.proxy_tensor import make_fx
 
-from hyuav.recording import compile_function, record
+from hyuav.recording import DoOnce, compile_function, record
 
 
 def test_what_a_function_does_is_recorded_and_not_done() -> None:
@@ -61,3 +62,28 @@ def test_a_compiled_function_does_the_same_in_every_call() -> None:
     for times in range(1, 4):
         program(change)
         torch.testing.assert_close(state, times * change.tanh())
+
+
+def test_what_is_asked_for_twice_is_done_once() -> None:
+    twice = make_fx(lambda inputs, weight: (inputs @ weight).tanh() + inputs @ weight)
+    inputs, weight = torch.randn(4, 3), torch.randn(3, 2)
+    module = twice(inputs, weight)
+    DoOnce()(module.graph)
+    targets = [node.target for node in module.graph.nodes]
+    assert targets.count(torch.ops.aten.mm.default) == 1
+    product = inputs @ weight
+    torch.testing.assert_close(module(inputs, weight), product.tanh() + product)
+
+
+def test_what_changes_in_between_is_done_again() -> None:
+    weight, state = torch.eye(3), torch.zeros(3)
+
+    def function(change: Tensor) -> None:
+        for _ in range(2):
+            state.add_((change @ weight).sum(dim=0))
+        weight.add_(change.mT @ change / 2)
+        state.add_((change @ weight).sum(dim=0))
+
+    program = compile_function(function, [torch.ones(2, 3)])
+    program(torch.ones(2, 3))
+    assert state.tolist() == [2.0 + 2.0 + 8.0] * 3

@@ -16,15 +16,34 @@ import torch
 from tensordict.nn import CudaGraphModule
 from torch import Tensor
 from torch._dynamo.exc import BackendCompilerFailed
+from torch._functorch.compile_utils import fx_graph_cse
 from torch._guards import TracingContext, tracing
+from torch._inductor.custom_graph_pass import CustomGraphPass, get_hash_for_files
 from torch._inductor.exc import InductorError
 from torch._subclasses.fake_tensor import FakeTensorMode
-from torch.fx import GraphModule
+from torch.fx import Graph, GraphModule
 from torch.fx.experimental.proxy_tensor import make_fx
 from torch.fx.experimental.symbolic_shapes import ShapeEnv
 
 COMPILATION_ERRORS = (BackendCompilerFailed, InductorError)
 """What :func:`compile_function` raises where there is no working compiler."""
+
+
+class DoOnce(CustomGraphPass):
+    """What a graph does twice to the same tensors, let it do once.
+
+    Losses that know nothing of each other ask for the same networks' outputs.
+    """
+
+    def __call__(self, graph: Graph) -> None:
+        """Change the graph's module, which Inductor has freed of all changes in place."""
+        module = graph.owning_module
+        assert module is not None
+        module.graph = fx_graph_cse(graph)
+
+    def uuid(self) -> bytes:
+        """By which compiled graphs are found on the disk again."""
+        return get_hash_for_files((__file__,))
 
 
 def has_compiler(device: torch.device) -> bool:
@@ -119,6 +138,7 @@ def _compile(
         "cpp.use_decompose_tanh": True,
         "cpp.vec_isa_ok": True if trust_compiler else None,
         "pattern_matcher": False,
+        "post_grad_custom_pre_pass": DoOnce(),
     }
     return compile_graph(graph, arguments, options)
 

@@ -71,25 +71,22 @@ class LearnerMLP(nn.Module):
                 layers.append(nn.LayerNorm(after, elementwise_affine=False))
             layers.append(ACTIVATIONS[activation]())
         layers.append(LearnerLinear(learners, sizes[-1], out_features))
-        if output is not None:
-            layers.append(output)
         self.layers = nn.Sequential(*layers)
+        self.output = nn.Identity() if output is None else output
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Map inputs (N, ..., k) that join to ``in_features`` to (N, ..., out_features).
 
         A single slot of each learner, (N, k), is taken as well.
         """
-        return self._through(self.layers, *inputs)
+        outputs: Tensor = self.output(self.before_output(*inputs))
+        return outputs
 
     def before_output(self, *inputs: Tensor) -> Tensor:
         """The same up to the last layer's result, before ``output`` is applied to it."""
-        return self._through(self.layers[:-1], *inputs)
-
-    def _through(self, layers: nn.Module, *inputs: Tensor) -> Tensor:
         joined = inputs[0] if len(inputs) == 1 else torch.cat(inputs, dim=-1)
         learners, features = joined.shape[0], joined.shape[-1]
-        outputs: Tensor = layers(joined.reshape(learners, -1, features))
+        outputs: Tensor = self.layers(joined.reshape(learners, -1, features))
         return outputs.reshape(*joined.shape[:-1], outputs.shape[-1])
 
 

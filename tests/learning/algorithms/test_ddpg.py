@@ -112,14 +112,9 @@ def test_the_defaults_are_the_papers() -> None:
 
 
 def test_an_actor_is_saturated_beyond_a_bound() -> None:
-    loss, batch = DDPG(hidden_sizes=(8,)).build(2, TEN_UES).loss, mini_batch(2, 5)
-    last = loss.actor_network_params["module", "layers", "2", "bias"].data
-    assert not saturation(loss, batch).any()
-    last.copy_(torch.tensor([[[0.0, 3.0]], [[-100.0, 3.0]]]) + UNSATURATED)
-    with torch.no_grad():
-        loss.actor_network_params["module", "layers", "2", "weight"].data.zero_()
-    expected = torch.tensor([9.0, (98.0 - UNSATURATED) ** 2 + 9.0])
-    torch.testing.assert_close(saturation(loss, batch), expected.unsqueeze(-1).expand(2, 5))
+    outputs = torch.tensor([[0.0, UNSATURATED], [0.0, UNSATURATED + 3.0], [-100.0, -5.0]])
+    expected = torch.tensor([0.0, 9.0, (100.0 - UNSATURATED) ** 2 + (5.0 - UNSATURATED) ** 2])
+    torch.testing.assert_close(saturation(outputs), expected)
 
 
 @pytest.mark.parametrize("kind", [DDPG, TD3])

@@ -121,22 +121,18 @@ class DDPG(AlgorithmParameters):
 
         return value
 
-    def act(self, loss: LossModule, weights: TensorDictParams, observation: Tensor) -> Tensor:
-        """What the actors do with these weights: (N, K, 2)."""
-        with weights.to_module(loss.actor_network, preserve_module_state=False):
-            action: Tensor = loss.actor_network.module(observation)
-        return action
-
     @torch.no_grad()
     def rate(
         self, loss: LossModule, weights: TensorDictParams, observation: Tensor, actions: Tensor
     ) -> Tensor:
-        """What the critics, with these weights, hold of actions (N, A, K, 2): (N, A, K, 1).
+        """What the critics, with these weights, hold of actions (N, ..., K, 2): (N, ..., K, 1).
 
         Of several critics it is the least.
         """
         network = getattr(loss, self.critic_name)
-        observed = observation.unsqueeze(1).expand(*actions.shape[:-1], -1)
+        observed = observation
+        if actions.ndim > observation.ndim:
+            observed = observation.unsqueeze(1).expand(*actions.shape[:-1], -1)
         values = []
         for own in weights.unbind(0) if weights.batch_dims else (weights,):
             with own.to_module(network, preserve_module_state=False):
@@ -148,10 +144,18 @@ class DDPG(AlgorithmParameters):
     ) -> Tensor | float:
         """What is added to the actor's loss, so that it does not stick: (N, K)."""
         added: Tensor | float = 0.0
+        if not (self.saturation_penalty or self.alternatives_weight):
+            return added
+        observation = batch["observation"]
+        with loss.actor_network_params.to_module(loss.actor_network, preserve_module_state=False):
+            network = loss.actor_network.module
+            output = network.before_output(observation)
+            action = network.output(output)
         if self.saturation_penalty:
-            added = added + self.saturation_penalty * saturation(loss, batch)
+            added = added + self.saturation_penalty * saturation(output)
         if self.alternatives_weight:
-            added = added + self.alternatives_weight * self.missed(loss, flights, batch)
+            missed = self.missed(loss, flights, observation, action)
+            added = added + self.alternatives_weight * missed
         return added
 
     def alternatives(self, flights: BestFlights, observation: Tensor) -> Tensor:
@@ -172,42 +176,39 @@ class DDPG(AlgorithmParameters):
             return hovering.unsqueeze(1)
         return torch.stack([hovering, flights.towards(observation)], dim=1)
 
-    def missed(self, loss: LossModule, flights: BestFlights, batch: TensorDictBase) -> Tensor:
+    def missed(
+        self, loss: LossModule, flights: BestFlights, observation: Tensor, action: Tensor
+    ) -> Tensor:
         """Squared distance of the actor from the best alternative, 0 where none is clearly better.
 
         Args:
-            loss: with the actor and the critics.
+            loss: with the critics.
             flights: the best so far.
-            batch: (N, K) transitions.
+            observation: (N, K, U + 5).
+            action: (N, K, 2), what the actor does.
 
         Returns:
             (N, K).
         """
-        observation = batch["observation"]
-        action = self.act(loss, loss.actor_network_params, observation)
         others = self.alternatives(flights, observation)
         weights = getattr(loss, f"{self.critic_name}_params").data
-        actions = torch.cat([action.detach().unsqueeze(1), others], dim=1)
-        values = self.rate(loss, weights, observation, actions).squeeze(-1)
-        worth, best = values[:, 1:].max(dim=1)
+        worth, best = self.rate(loss, weights, observation, others).squeeze(-1).max(dim=1)
+        own = self.rate(loss, weights, observation, action.detach()).squeeze(-1)
         chosen = torch.take_along_dim(others, best[:, None, :, None], dim=1).squeeze(1)
         distance = (action - chosen).square().sum(dim=-1)
-        return (worth > values[:, 0] + CLEARLY) * distance
+        return (worth > own + CLEARLY) * distance
 
 
-def saturation(loss: LossModule, batch: TensorDictBase) -> Tensor:
+def saturation(output: Tensor) -> Tensor:
     """How far an actor's outputs before the tanh lie beyond :data:`UNSATURATED`.
 
     There the tanh is flat, and an actor that has gone far does not feel a better action elsewhere.
 
     Args:
-        loss: with the actor.
-        batch: (N, K) transitions.
+        output: (..., 2).
 
     Returns:
-        (N, K) sums of squares over both components.
+        (...) sums of squares over both components.
     """
-    with loss.actor_network_params.to_module(loss.actor_network):
-        output: Tensor = loss.actor_network.module.before_output(batch["observation"])
     beyond = output.abs() - UNSATURATED
     return beyond.clamp(min=0.0).square().sum(dim=-1)
