@@ -76,12 +76,12 @@ def test_the_best_flight_goes_on_with_a_training_that_is_resumed() -> None:
 
 
 def test_the_best_flights_are_joined_at_once_or_as_soon_as_possible() -> None:
-    flights = BestFlights(2, SCENARIO, 16)
+    flights = BestFlights(2, SCENARIO)
     observation = torch.zeros(2, 6, 16)
     observation[..., -1] = torch.arange(6) / 3.0 - 1.0  # of the slots 0 to 5
     assert torch.equal(flights.towards(observation), torch.zeros(2, 6, 2))  # none yet: hover
     way = 0.3 * torch.arange(24.0).reshape(6, 2, 2) / 24.0
-    flights.observations[..., :2] = way
+    flights.keep(torch.zeros(6, 2, 2), way, torch.zeros(2))
     expected = (way.transpose(0, 1) / 0.2).clamp(-1.0, 1.0)
     torch.testing.assert_close(flights.towards(observation), expected)
     observation[..., 0] = -0.9  # far to the left: at full speed to the right
@@ -93,7 +93,7 @@ def test_the_way_of_the_best_flight_is_kept_with_its_actions() -> None:
     for _ in range(4):
         trained.fly()
     flights, scale = best(trained), SCENARIO.max_speed / 100.0
-    way = flights.observations[..., :2]
+    way = flights.way
     start = torch.tensor(SCENARIO.helper_start) / 100.0
     before = torch.cat([start.expand(1, 3, 2), way[:-1]])
     flown = before + scale * flights.actions

@@ -41,19 +41,32 @@ class Afterstate(nn.Module):
         one.
         """
         scenario = self._system.scenario
-        half_side = scenario.map_side / 2
-        position = observation[..., :2] * half_side
+        position = observation[..., :2] * (scenario.map_side / 2)
         if self._geofence:
             action = fenced(scenario, position, action)
         moved = self._system.move(position, action, self._norm_limit)
-        distances = self._system.distances(moved.position)
+        beside = moved.off_map.unsqueeze(-1) * 2.0 - 1.0
+        return self._features(moved.position, beside, observation[..., -1:])
+
+    def at(self, place: Tensor, clock: Tensor) -> Tensor:
+        """The features (..., 2 U + 5) of having flown somewhere on the map.
+
+        Args:
+            place: (..., 2) in units of half the map's side.
+            clock: (..., 1), what the clock shows; without one it does not matter.
+        """
+        position = place * (self._system.scenario.map_side / 2)
+        return self._features(position, torch.full_like(clock, -1.0), clock)
+
+    def _features(self, position: Tensor, beside: Tensor, clock: Tensor) -> Tensor:
+        scenario = self._system.scenario
+        half_side = scenario.map_side / 2
+        distances = self._system.distances(position)
         inside = scenario.coverage_radius - distances[..., : scenario.num_ues]
         features = [
-            moved.position / half_side,
+            position / half_side,
             distances / half_side - 1.0,
             torch.tanh(inside / (BLUR * scenario.map_side)),
-            moved.off_map.unsqueeze(-1) * 2.0 - 1.0,
+            beside,
         ]
-        if self._clock:
-            features.append(observation[..., -1:])
-        return torch.cat(features, dim=-1)
+        return torch.cat([*features, clock] if self._clock else features, dim=-1)

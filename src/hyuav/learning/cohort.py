@@ -12,6 +12,7 @@ from torchrl.collectors import Collector
 
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
+from hyuav.learning.imagination import Imagination
 from hyuav.learning.repetition import BestFlights, as_planned
 from hyuav.learning.replay import clear_unused, forget, latest, make_replay
 from hyuav.learning.slots import CompiledSlots
@@ -87,6 +88,10 @@ class Cohort:
         draw_weights(self.algorithm.loss, seeds, "weights")
         if self.algorithm.control_variate is not None:
             draw_weights(self.algorithm.control_variate, seeds, "control variate")
+        imagined = algorithm.imagined_flights
+        self._imagination = (
+            Imagination(imagined, scenario, schemes, self.env.device) if imagined else None
+        )
         self._streams = self._random_streams(seeds)
         self.replay = make_replay(
             replay_size,
@@ -180,17 +185,19 @@ class Cohort:
         return flown
 
     def _keep_flight(self, flights: BestFlights) -> None:
-        """Keep the episode's flight where it is the best so far.
+        """Keep the episode's flight where it is the best so far, or one that is better still.
 
         It counts what it earned; or where it is known, what is to be expected of it.
         """
         flown = self.replay.storage._storage[latest(self.replay, self.scenario.num_slots)]
-        variate = self.algorithm.control_variate
-        reward = flown["next", "reward"].sum(dim=(0, 2))
-        if variate is not None:
-            reward = variate.expected(flown["next", "observation"])
-            flights.reward.copy_(variate.expected(flights.observations).nan_to_num(-torch.inf))
-        flights.keep(flown, reward)
+        way, variate = flown["next", "observation"][..., :2], self.algorithm.control_variate
+        if variate is None:
+            flights.keep(flown["action"], way, flown["next", "reward"].sum(dim=(0, 2)))
+            return
+        flights.reward.copy_(variate.expected(flights.way).nan_to_num(-torch.inf))
+        flights.keep(flown["action"], way, variate.expected(way))
+        if self._imagination and self.episode >= self.algorithm.parameters.warm_up_episodes:
+            self._imagination.improve(flights, variate, self.episode)
 
     def _stop_where_not_finite(self, reward: Tensor, losses: dict[str, Tensor]) -> None:
         finite = finite_learners(self.algorithm.loss) & reward.isfinite()

@@ -40,26 +40,37 @@ class ControlVariate(nn.Module):
         outputs = 1 + 3 * scenario.num_ues + 2
         self.network = LearnerMLP(learners, self.afterstate.size, HIDDEN_SIZES, outputs, "tanh")
 
-    def forward(self, following: Tensor) -> tuple[Tensor, Tensor]:
-        """What is to be expected of slots (N, K, 1), and what each power adds (N, K, 3 U + 2).
+    def forward(self, place: Tensor, clock: Tensor) -> tuple[Tensor, Tensor]:
+        """What is to be expected of slots (N, ..., 1), and what each power adds (N, ..., 3 U + 2).
 
         Args:
-            following: observations (N, K, U + 5) at the end of the slots; of these the position
-                and the clock count, and not the mode, which depends on the fading.
+            place: (N, ..., 2), where the helper is at their end, in units of half the map's side.
+            clock: (N, ..., 1), what the clock then shows; without one it does not matter.
         """
-        hovering = following.new_zeros(*following.shape[:-1], 2)
-        outputs = self.network(self.afterstate(following, hovering)) * self._scale
+        outputs = self.network(self.afterstate.at(place, clock)) * self._scale
         return outputs[..., :1], outputs[..., 1:]
 
+    def _of(self, batch: TensorDictBase) -> tuple[Tensor, Tensor]:
+        """As :meth:`forward`, of a mini-batch; the mode, which the fading decides, is not used."""
+        following = batch["next", "observation"]
+        return self(following[..., :2], following[..., -1:])
+
     @torch.no_grad()
-    def expected(self, following: Tensor) -> Tensor:
-        """What is to be expected of a flight (T, N, U + 5), by all that was earned so far: (N,)."""
-        return self(following.transpose(0, 1))[0].sum(dim=(1, 2))
+    def expected(self, way: Tensor) -> Tensor:
+        """What is to be expected of flights, by all that was earned so far: (N, ...).
+
+        Args:
+            way: (T, N, ..., 2), where they lead, in units of half the map's side.
+        """
+        slots = torch.arange(1, len(way) + 1, device=way.device).to(way.dtype)
+        clock = (slots * (2.0 / len(way)) - 1.0).reshape(-1, *[1] * (way.ndim - 1))
+        clock = clock.expand(*way.shape[:-1], 1)
+        return self(way.transpose(0, 1), clock.transpose(0, 1))[0].squeeze(-1).sum(dim=1)
 
     @torch.no_grad()
     def luck(self, batch: TensorDictBase) -> Tensor:
         """What the fading added to the rewards of a mini-batch (N, K): (N, K, 1)."""
-        _, weights = self(batch["next", "observation"])
+        _, weights = self._of(batch)
         return _luck(weights, batch)
 
     def fair(self, batch: TensorDictBase) -> TensorDictBase:
@@ -72,7 +83,7 @@ class ControlVariate(nn.Module):
 
     def loss(self, batch: TensorDictBase) -> Tensor:
         """Squared error (N, K) of the regression on a mini-batch as :meth:`fair` gives it."""
-        expected, weights = self(batch["next", "observation"])
+        expected, weights = self._of(batch)
         reward = batch["next", "reward"] + batch[LUCK]
         return (reward - expected - _luck(weights, batch)).square().squeeze(-1)
 

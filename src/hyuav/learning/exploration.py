@@ -3,12 +3,12 @@
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 
 from hyuav.scenario import Scenario
 
 BEYOND = 1.25
-"""Where a warm-up's destinations are drawn, in units of the map; those beyond it are brought to
-its edge."""
+"""Where destinations are drawn, in units of the map; those beyond it are brought to its edge."""
 
 JITTER = 0.1
 """Standard deviation of a warm-up's noise, in units of v_max."""
@@ -16,6 +16,15 @@ JITTER = 0.1
 EVENLY = (0.7548776662466927, 0.5698402909980532)
 """Multiples of both fill the unit square evenly (Roberts, "The unreasonable effectiveness of
 quasirandom sequences", 2018)."""
+
+
+def destinations(share: Tensor) -> Tensor:
+    """Places all over the map, its edges more densely, in units of half the map's side.
+
+    Args:
+        share: (..., 2) in [0, 1).
+    """
+    return ((2.0 * share - 1.0) * BEYOND).clamp(-1.0, 1.0)
 
 
 class GaussianNoise(TensorDictModuleBase):
@@ -91,7 +100,7 @@ class WarmUp(TensorDictModuleBase):
         self.origin.copy_(torch.where(begins & (self.episode == 0), anywhere, self.origin))
         self.episode.add_(begins)
         share = torch.frac(self.origin + self.episode * self.multiples)
-        destination = ((2.0 * share - 1.0) * BEYOND).clamp(-1.0, 1.0) * self._half_side
+        destination = destinations(share) * self._half_side
         towards = (destination - tensordict["position"]) / self._reach
         flown = (towards + JITTER * normal).clamp(-1.0, 1.0)
         tensordict["action"] = torch.where(self.episode > self._episodes, action, flown)

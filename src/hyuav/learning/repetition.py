@@ -1,4 +1,4 @@
-"""The best flight so far of each learner, to be flown again and to be followed."""
+"""The best flight so far of each learner, to be flown again and to be joined."""
 
 import torch
 from tensordict import TensorDictBase
@@ -14,7 +14,7 @@ def as_planned(tensordict: TensorDictBase, planned: Tensor) -> TensorDictBase:
 
 
 class BestFlights(nn.Module):
-    """What each learner did in the episode in which it earned most.
+    """The flight of each learner that earned most, or of which most is to be expected.
 
     The helper moves as it is told, so that the same actions lead it the same way, through other
     fading. A way that was found once by chance is thus seen often enough to be learned of before
@@ -24,38 +24,36 @@ class BestFlights(nn.Module):
     Args:
         learners: N.
         scenario: that they fly.
-        size: of an observation, U + 5 or U + 6.
     """
 
     reward: Tensor
-    """(N,), what each earned; minus infinity before the first."""
+    """(N,), of each; minus infinity before the first."""
     actions: Tensor
     """(T, N, 2)."""
-    observations: Tensor
-    """(T, N, U + 6), what each saw after each slot."""
+    way: Tensor
+    """(T, N, 2), where each was after each slot, in units of half the map's side."""
 
-    def __init__(self, learners: int, scenario: Scenario, size: int) -> None:
+    def __init__(self, learners: int, scenario: Scenario) -> None:
         super().__init__()
         shape = scenario.num_slots, learners, 2
         self._slots_per_unit = scenario.num_slots / 2
         self._reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
         self.register_buffer("reward", torch.full((learners,), -torch.inf))
         self.register_buffer("actions", torch.full(shape, torch.nan))
-        self.register_buffer("observations", torch.full((*shape[:2], size), torch.nan))
+        self.register_buffer("way", torch.full(shape, torch.nan))
 
-    def keep(self, flown: TensorDictBase, reward: Tensor) -> None:
-        """Keep the flight of an episode where it earned more than any before.
+    def keep(self, actions: Tensor, way: Tensor, reward: Tensor) -> None:
+        """Keep a flight where it is better than the best before.
 
         Args:
-            flown: its slots (T, N).
-            reward: (N,) that it earned.
+            actions: (T, N, 2).
+            way: (T, N, 2), where they led.
+            reward: (N,), what it earned or what is to be expected of it.
         """
         better = reward > self.reward
         self.reward.copy_(torch.where(better, reward, self.reward))
-        where = better.unsqueeze(-1)
-        self.actions.copy_(torch.where(where, flown["action"], self.actions))
-        following = flown["next", "observation"]
-        self.observations.copy_(torch.where(where, following, self.observations))
+        for kept, new in ((self.actions, actions), (self.way, way)):
+            kept.copy_(torch.where(better.unsqueeze(-1), new, kept))
 
     def towards(self, observation: Tensor) -> Tensor:
         """Actions (N, K, 2) that join the best flights by the next slot, or as soon as possible.
@@ -67,7 +65,6 @@ class BestFlights(nn.Module):
         """
         flown = ((observation[..., -1] + 1.0) * self._slots_per_unit).round().long()
         slot = flown.clamp(max=len(self.actions) - 1).unsqueeze(-1).expand(*flown.shape, 2)
-        way = self.observations[..., :2].transpose(0, 1)
-        position = torch.take_along_dim(way, slot, dim=1)
+        position = torch.take_along_dim(self.way.transpose(0, 1), slot, dim=1)
         action = (position - observation[..., :2]) / self._reach
         return action.clamp(-1.0, 1.0).nan_to_num(0.0)

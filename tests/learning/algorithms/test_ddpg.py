@@ -106,6 +106,7 @@ def test_the_defaults_are_the_papers() -> None:
         "saturation_penalty": 0.0,
         "alternatives_weight": 0.0,
         "control_variate": False,
+        "imagined_flights": 0,
         "afterstate": False,
         "noise_floor": 0.0,
     }
@@ -152,10 +153,8 @@ def flying_along_x(kind: type[DDPG], weight: float, slope: float) -> Algorithm:
 def test_the_alternatives_are_to_hover_and_with_a_clock_to_join_the_best_flight(
     clock: bool,
 ) -> None:
-    flights, observation = BestFlights(1, TEN_UES, 16), torch.zeros(1, 1, 15 + clock)
-    flights.observations[10, 0, :2] = torch.tensor(
-        [0.1, -0.9]
-    )  # after the slot that the clock tells
+    flights, observation = BestFlights(1, TEN_UES), torch.zeros(1, 1, 15 + clock)
+    flights.way[10, 0] = torch.tensor([0.1, -0.9])  # after the slot that the clock tells
     found = DDPG(clock=clock).alternatives(flights, observation)
     expected = [[0.0, 0.0], [0.5, -1.0]]
     torch.testing.assert_close(found, torch.tensor(expected[: 1 + clock])[None, :, None])

@@ -68,6 +68,10 @@ class AlgorithmParameters(Parameters, ABC):
     control_variate: bool = parameter(switch, False)
     """Take off each reward what its slot's fading brought; see
     :class:`hyuav.learning.control_variate.ControlVariate`."""
+    imagined_flights: int = parameter(count(0, 100_000), 0)
+    """After each episode from the end of the warm-up on, where flights are kept and there is a
+    control variate: how many it judges, for one that is better than the best so far; see
+    :class:`hyuav.learning.imagination.Imagination`."""
 
     @abstractmethod
     def build(self, learners: int, scenario: Scenario) -> "Algorithm":
@@ -91,7 +95,7 @@ class AlgorithmParameters(Parameters, ABC):
             explorer = TensorDictSequential(algorithm.explorer, warm_up)
             algorithm = replace(algorithm, explorer=explorer)
         if self.keeps_flights and algorithm.best_flights is None:
-            flights = BestFlights(learners, scenario, self.observation_size(scenario))
+            flights = BestFlights(learners, scenario)
             algorithm = replace(algorithm, best_flights=flights)
         if self.control_variate:
             variate = ControlVariate(learners, scenario, self.reward_scale, clock=self.clock)

@@ -57,7 +57,7 @@ class DDPG(AlgorithmParameters):
             delay_value=True,
             reduction="none",
         )
-        flights = BestFlights(learners, scenario, self.observation_size(scenario))
+        flights = BestFlights(learners, scenario)
         self.estimate_values(loss, self.best_alternative(loss, flights))
         critic_optimizer = adam(loss.value_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)

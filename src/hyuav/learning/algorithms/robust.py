@@ -30,6 +30,7 @@ class Robust(AlgorithmParameters):
     repeat_every: int = parameter(count(0), 4)
     restart_after: int = parameter(count(0), 200)
     control_variate: bool = parameter(switch, True)
+    imagined_flights: int = parameter(count(0, 100_000), 128)
 
 
 @dataclass(frozen=True)

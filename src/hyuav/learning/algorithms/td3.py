@@ -37,7 +37,7 @@ class TD3(DDPG):
             loss_function="l2",
             reduction="none",
         )
-        flights = BestFlights(learners, scenario, self.observation_size(scenario))
+        flights = BestFlights(learners, scenario)
         self.estimate_values(loss, self.best_alternative(loss, flights))
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)

@@ -1,0 +1,74 @@
+"""Flights that were never flown, and what is to be expected of them."""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from hyuav.learning.control_variate import ControlVariate
+from hyuav.learning.exploration import EVENLY, destinations
+from hyuav.learning.repetition import BestFlights
+from hyuav.scenario import Scenario
+from hyuav.system import SecureOffloadingSystem
+
+
+class Imagination:
+    """Flights to places all over the map, the best of which are worth trying.
+
+    How the helper flies is known, and what a place earns is what a learner's regression holds
+    after all that it has seen; so flights can be judged before they are flown, as in Dyna (Sutton,
+    "Integrated architectures for learning, planning, and reacting", ICML 1990). What was judged
+    too well is found out by flying it. From episode to episode the places fill the map evenly.
+
+    Args:
+        flights: D, of which the best is looked for at once.
+        scenario: that is flown.
+        schemes: of the N learners.
+        device: of all tensors.
+    """
+
+    def __init__(
+        self, flights: int, scenario: Scenario, schemes: Sequence[str], device: torch.device
+    ) -> None:
+        self._scenario, self._device = scenario, device
+        self._places = torch.arange(flights, dtype=torch.float64, device=device)
+        self._system = SecureOffloadingSystem(scenario, device)
+        limit = self._system.norm_limit(schemes)
+        self._norm_limit = None if limit is None else limit.unsqueeze(1)
+        self._learners = len(schemes)
+
+    def improve(self, best: BestFlights, variate: ControlVariate, episode: int) -> None:
+        """Put an imagined flight in place of the best one of which less is to be expected.
+
+        Args:
+            best: of each learner.
+            variate: which has learned what to expect.
+            episode: in which others are imagined than in those before.
+        """
+        actions, way = self.fly(episode)
+        expected, chosen = variate.expected(way).max(dim=1)
+        index = chosen[None, :, None, None].expand(len(way), -1, 1, 2)
+        own = (torch.take_along_dim(each, index, dim=2).squeeze(2) for each in (actions, way))
+        best.keep(*own, expected)
+
+    def fly(self, episode: int) -> tuple[Tensor, Tensor]:
+        """The flights of an episode.
+
+        Returns:
+            the actions (T, N, D, 2), and where they lead, in units of half the map's side.
+        """
+        scenario = self._scenario
+        half_side = scenario.map_side / 2
+        reach = scenario.max_speed * scenario.slot_duration
+        places = self._places + len(self._places) * episode
+        share = torch.stack([torch.frac(places * multiple) for multiple in EVENLY], dim=-1)
+        destination = destinations(share.float()) * half_side
+        start = torch.tensor(scenario.helper_start, dtype=torch.float32, device=self._device)
+        position = start.expand(self._learners, len(places), 2)
+        actions, way = [], []
+        for _ in range(scenario.num_slots):
+            action = ((destination - position) / reach).clamp(-1.0, 1.0)
+            position = self._system.move(position, action, self._norm_limit).position
+            actions.append(action.expand(position.shape))
+            way.append(position / half_side)
+        return torch.stack(actions), torch.stack(way)

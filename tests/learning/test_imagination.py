@@ -1,0 +1,91 @@
+"""Flights that are judged before they are flown."""
+
+import dataclasses
+
+import pytest
+import torch
+from torch import Tensor
+
+from hyuav import Scenario, make_env
+from hyuav.learning.algorithms import DDPG
+from hyuav.learning.cohort import Cohort, Learner
+from hyuav.learning.control_variate import ControlVariate
+from hyuav.learning.imagination import Imagination
+from hyuav.learning.repetition import BestFlights
+
+SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
+CPU = torch.device("cpu")
+
+
+class FarIsBetter(ControlVariate):
+    """Expects of a slot as much as the helper is far along x, and of the second learner -x."""
+
+    def forward(self, place: Tensor, clock: Tensor) -> tuple[Tensor, Tensor]:
+        signs = torch.tensor([1.0, -1.0]).reshape(-1, *[1] * (place.ndim - 1))
+        return place[..., :1] * signs, clock
+
+
+@pytest.mark.parametrize("limit", ["box", "disc"])
+def test_the_environment_flies_what_was_imagined(limit: str) -> None:
+    scenario = dataclasses.replace(SCENARIO, speed_limit=limit)
+    schemes = ["hybrid", "relay"]
+    actions, way = Imagination(7, scenario, schemes, CPU).fly(3)
+    assert actions.shape == way.shape == (6, 2, 7, 2)
+    env = make_env(scenario, schemes, (2, 7), seed=0)
+    state = env.reset()
+    for action, place in zip(actions, way, strict=True):
+        state = env.step_mdp(env.step(state.set("action", action)))
+        torch.testing.assert_close(state["position"], place * 100.0, atol=1e-3, rtol=0.0)
+
+
+def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_reached() -> None:
+    imagination = Imagination(50, dataclasses.replace(SCENARIO, num_slots=10), ["hybrid"], CPU)
+    ends = torch.stack([imagination.fly(episode)[1][-1, 0] for episode in range(40)]).flatten(0, 1)
+    assert len(ends.unique(dim=0)) > 0.5 * len(ends)  # those at the edges coincide
+    for corner in ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 0.0), (-0.5, 0.6)):
+        assert (ends - torch.tensor(corner)).norm(dim=-1).min() < 0.05
+
+
+def test_of_the_flights_the_one_of_which_most_is_expected_becomes_each_learners_best() -> None:
+    best = BestFlights(2, SCENARIO)
+    imagination = Imagination(40, SCENARIO, ["hybrid", "hybrid"], CPU)
+    variate = FarIsBetter(2, SCENARIO, 1.0, clock=True)
+    imagination.improve(best, variate, 1)
+    actions, way = imagination.fly(1)
+    for learner, sign in enumerate((1.0, -1.0)):
+        sums = sign * way[..., learner, :, 0].sum(dim=0)
+        assert best.reward[learner] == sums.max()
+        assert torch.equal(best.way[:, learner], way[:, learner, sums.argmax()])
+        assert torch.equal(best.actions[:, learner], actions[:, learner, sums.argmax()])
+    kept = best.actions.clone()
+    best.reward += 100.0
+    imagination.improve(best, variate, 2)
+    assert torch.equal(best.actions, kept)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_what_was_imagined_is_flown_after_the_warm_up(
+    compiled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def far(_: ControlVariate, way: Tensor) -> Tensor:
+        return way[..., 0].sum(dim=0) + way[-1, ..., 1]  # and no two flights as far
+
+    monkeypatch.setattr(ControlVariate, "expected", far)
+    algorithm = DDPG(
+        hidden_sizes=(8,),
+        clock=True,
+        control_variate=True,
+        warm_up_episodes=3,
+        repeat_every=2,
+        imagined_flights=100,
+    )
+    trained = Cohort(SCENARIO, [Learner("jamming", 1)], algorithm, 60, 8, None)
+    for _ in range(3):
+        trained.fly()
+    if compiled:
+        trained.compile()
+    trained.fly()
+    actions, way = Imagination(100, SCENARIO, ["jamming"], CPU).fly(3)
+    farthest = (way[:, 0, :, 0].sum(dim=0) + way[-1, 0, :, 1]).argmax()
+    stored = trained.replay.storage._storage["action"][18:24, 0]
+    torch.testing.assert_close(stored, actions[:, 0, farthest])
