@@ -15,7 +15,6 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from hyuav.envs.rendering import (
-    EAVESDROPPER_COLOR,
     UE_COLOR,
     draw_coverage,
     draw_flight,
@@ -33,6 +32,13 @@ SLOTS_PER_SECOND, SLOTS_HELD = 2, 3
 
 LINK_COLOR = "0.35"
 """Of what UEs send."""
+
+JAMMING: dict[str, Any] = {
+    "color": MODE_COLORS["jamming"],
+    "linestyle": "dashed",
+    "linewidth": 1.6,
+}
+"""The line from the helper to the eavesdropper that it jams."""
 
 
 def animate_flight(scenario: Scenario, slots: pd.DataFrame, file: Path) -> None:
@@ -121,8 +127,7 @@ def _draw_links(axes: Axes, scenario: Scenario, helper: Point, now: pd.Series) -
         axes.plot(*zip(*ends, strict=True), **style | {"linewidth": 1.6})
     if not now["relay"]:
         ends = (helper, scenario.eavesdropper_position)
-        jammed: Any = {"color": EAVESDROPPER_COLOR, "linestyle": "dotted", "linewidth": 1.2}
-        axes.plot(*zip(*ends, strict=True), **jammed, zorder=2.2)
+        axes.plot(*zip(*ends, strict=True), **JAMMING, zorder=2.2)
 
 
 def _draw_rates(axes: Axes, slots: pd.DataFrame, flown: int) -> None:
@@ -142,7 +147,7 @@ def _draw_legend(figure: Figure) -> None:
         Line2D([], [], **ue, markerfacecolor=UE_COLOR, linestyle="", label="UE offloads"),
         Line2D([], [], **ue, markerfacecolor="white", linestyle="", label="UE computes itself"),
         Line2D([], [], color=LINK_COLOR, linewidth=0.7, label="offloading"),
-        Line2D([], [], color=EAVESDROPPER_COLOR, linestyle="dotted", label="jamming of E"),
+        Line2D([], [], **JAMMING, label="jamming of E"),
         *(
             Patch(facecolor=MODE_COLORS[mode], label=f"sum-rate, {mode}")
             for mode in ("relay", "jamming")

@@ -131,7 +131,7 @@ class Cohort:
     def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
         with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
             tensordict = self.algorithm.explorer(tensordict)
-        if not self.algorithm.repeats(self.episode):
+        if not self.algorithm.parameters.repeat_every:
             return tensordict
         return as_planned(tensordict, self._plan()[int(tensordict["step_count"][0])])
 

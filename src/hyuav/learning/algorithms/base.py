@@ -131,11 +131,7 @@ class AlgorithmParameters(Parameters, ABC):
     @property
     def memory(self) -> Memory:
         """What is kept of each slot."""
-        return Memory(
-            self.reward_scale,
-            self.finite_horizon,
-            fading=self.control_variate,
-        )
+        return Memory(self.reward_scale, self.finite_horizon, fading=self.control_variate)
 
     def estimate_values(
         self, loss: LossModule, alternative: Callable[[Tensor], Tensor] | None = None
