@@ -21,7 +21,7 @@ from hyuav.comparison.directory import ComparisonDirectory
 from hyuav.comparison.plan import Compare, require_libraries
 from hyuav.comparison.tables import print_tables
 from hyuav.comparison.work import work_off
-from hyuav.configuration import Config, recipe, section
+from hyuav.configuration import Config, override, recipe, section, telling_how_to_go_on
 from hyuav.evaluation import EvaluationParameters
 from hyuav.learning.training import TrainingParameters
 from hyuav.report.page import write_comparison_report
@@ -40,6 +40,13 @@ from hyuav.tracking import LoggerParameters, log_comparison
     run_directory="${output}",
 )
 def main(config: Config, directory: Path) -> None:
+    """Do what is missing of the comparison; told to stop, say how to go on."""
+    again = [each for each in sys.argv[1:] if not each.startswith("output=")]
+    with telling_how_to_go_on(*again, override("output", directory)):
+        compare(config, directory)
+
+
+def compare(config: Config, directory: Path) -> None:
     """Train what is missing, print the tables, draw the figures."""
     options = section(config, Compare)
     require_libraries(options)

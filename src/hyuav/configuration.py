@@ -26,6 +26,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from hyuav.configuration_files import read_files_as_data
 from hyuav.errors import Halted, InputError, Interrupted, one_line, require_choice
+from hyuav.interruption import interrupted_by_sigterm
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.parameters import Parameters, refuse_unknown
 from hyuav.scenario import PRESETS, Scenario
@@ -179,7 +180,8 @@ def telling_how_to_go_on(
     """
     hint = f"go on with: {shlex.join([sys.orig_argv[0], sys.argv[0], *overrides])}"
     try:
-        yield
+        with interrupted_by_sigterm():
+            yield
     except KeyboardInterrupt as error:
         if not possible():
             raise

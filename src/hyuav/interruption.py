@@ -2,6 +2,8 @@
 
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any, Self
 
@@ -56,3 +58,25 @@ class Interruption:
         while self._former:
             number, handler = self._former.popitem()
             signal.signal(number, handler)
+
+
+@contextmanager
+def interrupted_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM interrupt what is done inside, as SIGINT does; it otherwise ends a process.
+
+    Raises:
+        Interrupted: in place of the end.
+    """
+
+    def interrupt(number: int, _: FrameType | None) -> None:
+        raise Interrupted("interrupted", number)
+
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)

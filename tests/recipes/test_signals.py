@@ -27,9 +27,11 @@ LONG = [
 ]
 
 
-def stop(command: list[str], directory: Path, number: signal.Signals) -> tuple[int, str, int]:
+def stop(
+    command: list[str], directory: Path, number: signal.Signals, run: str = "a, run"
+) -> tuple[int, str, int]:
     """Its exit status, what it said, and which episode was the last when it was asked."""
-    metrics = directory / "a, run" / "metrics.csv"
+    metrics = directory / run / "metrics.csv"
     before = readable_metrics(metrics)["episode"].max()
     running = subprocess.Popen(command, cwd=directory, stderr=subprocess.PIPE, text=True)
     while True:
@@ -60,3 +62,26 @@ def test_it_stops_after_the_episode_and_goes_on_by_the_command_that_it_names(
         command, former = shlex.split(again), last
         assert command[1:] == [str(RECIPES / "train.py"), 'resume="a, run"']
     assert run.metrics()["episode"].tolist() == list(range(1, former + 1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_comparison_too_goes_on_by_the_command_that_it_names(
+    tmp_path: Path, workers: int
+) -> None:
+    options = [each for each in LONG if each.startswith("training")]
+    asked = [
+        *("algorithm=ddpg", "scenario=two_clusters", "scheme=relay", "num_slots=[5,6]"),
+        *("learners=1", "evaluation.episodes=4", "evaluation.resolution=10", f"workers={workers}"),
+        *options,
+    ]
+    command = [sys.executable, str(RECIPES / "compare.py"), *asked, 'output="it"']
+    run, former = "it/shards/ddpg_two_clusters_T5.partial", 0
+    for _ in range(2):
+        code, said, reached = stop(command, tmp_path, signal.SIGTERM, run)
+        assert code == 143
+        line = said.splitlines()[-1]
+        assert line.startswith("interrupted")
+        assert reached > former
+        command, former = shlex.split(line.partition("; go on with: ")[2]), reached
+        assert command[1:] == [str(RECIPES / "compare.py"), *asked, 'output="it"']

@@ -48,8 +48,8 @@ class Imagination:
         actions, way = self.fly(episode)
         expected, chosen = variate.expected(way).max(dim=1)
         index = chosen[None, :, None, None].expand(len(way), -1, 1, 2)
-        own = (torch.take_along_dim(each, index, dim=2).squeeze(2) for each in (actions, way))
-        best.keep(*own, expected)
+        taken = torch.take_along_dim(actions, index, dim=2).squeeze(2)
+        best.keep(taken, torch.take_along_dim(way, index, dim=2).squeeze(2), expected)
 
     def fly(self, episode: int) -> tuple[Tensor, Tensor]:
         """The flights of an episode.
