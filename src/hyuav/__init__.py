@@ -7,7 +7,7 @@ import gymnasium
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.envs.transforms import make_env
 from hyuav.errors import InputError, InputTypeError
-from hyuav.learning.algorithms import DDPG, SAC, TD3, RobustDDPG, RobustTD3
+from hyuav.learning.algorithms import DDPG, SAC, TD3, RobustDDPG, RobustSAC, RobustTD3
 from hyuav.learning.algorithms.registry import OWN_FILES, register, run_own_files
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
@@ -21,6 +21,7 @@ __all__ = [
     "InputTypeError",
     "Learner",
     "RobustDDPG",
+    "RobustSAC",
     "RobustTD3",
     "Scenario",
     "SecureOffloadingEnv",

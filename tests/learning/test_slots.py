@@ -26,6 +26,7 @@ CASES = [
     pytest.param("td3", FADELESS, marks=pytest.mark.slow),
     pytest.param("td3_robust", FADELESS, marks=pytest.mark.slow),
     pytest.param("sac", SCENARIO, marks=pytest.mark.slow),
+    pytest.param("sac_robust", SCENARIO, marks=pytest.mark.slow),
     pytest.param("sac", FADELESS, marks=pytest.mark.slow),
 ]
 

@@ -14,7 +14,7 @@ from hyuav.learning.algorithms import DDPG
 from hyuav.runs import RunDirectory
 from recipe_calls import TINY, Call, Refusal
 
-NAMES = "ddpg, ddpg_robust, sac, td3, td3_robust"
+NAMES = "ddpg, ddpg_robust, sac, sac_robust, td3, td3_robust"
 RECIPES = Path(__file__).parents[2] / "recipes"
 SHORT = (*TINY, "scenario.num_slots=10")
 
@@ -168,7 +168,7 @@ def test_a_straight_flight_too_fast_for_the_horizon_is_left_out_and_named(
 REFUSALS = [
     (
         ["train", "algorithm=ppo"],
-        "algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, td3, td3_robust",
+        "algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, sac_robust, td3, td3_robust",
     ),
     (["train", "scenario=square"], "scenario = 'square': expected one of"),
     (["train", "scenario.ue_powr=1"], "scenario: unknown field 'ue_powr': did you mean 'ue_power'"),
@@ -215,7 +215,4 @@ def test_a_mistake_on_the_command_line_ends_the_process_with_status_2(tmp_path: 
         check=False,
     )
     assert ended.returncode == 2
-    assert (
-        ended.stderr
-        == "error: algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, td3, td3_robust\n"
-    )
+    assert ended.stderr == f"error: algorithm = 'ppo': expected one of {NAMES}\n"

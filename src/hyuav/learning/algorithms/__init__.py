@@ -3,7 +3,7 @@
 from hyuav.learning.algorithms.base import Algorithm, AlgorithmParameters, GradientStep, adam
 from hyuav.learning.algorithms.ddpg import DDPG
 from hyuav.learning.algorithms.registry import ALGORITHMS, register
-from hyuav.learning.algorithms.robust import RobustDDPG, RobustTD3
+from hyuav.learning.algorithms.robust import RobustDDPG, RobustSAC, RobustTD3
 from hyuav.learning.algorithms.sac import SAC
 from hyuav.learning.algorithms.td3 import TD3
 
@@ -16,6 +16,7 @@ __all__ = [
     "AlgorithmParameters",
     "GradientStep",
     "RobustDDPG",
+    "RobustSAC",
     "RobustTD3",
     "adam",
     "register",

@@ -10,7 +10,7 @@ from pathlib import Path
 from hyuav.errors import InputError, InputTypeError, one_line, rejection
 from hyuav.learning.algorithms.base import AlgorithmParameters
 from hyuav.learning.algorithms.ddpg import DDPG
-from hyuav.learning.algorithms.robust import RobustDDPG, RobustTD3
+from hyuav.learning.algorithms.robust import RobustDDPG, RobustSAC, RobustTD3
 from hyuav.learning.algorithms.sac import SAC
 from hyuav.learning.algorithms.td3 import TD3
 
@@ -23,6 +23,7 @@ ALGORITHMS: dict[str, type[AlgorithmParameters]] = {
     "sac": SAC,
     "ddpg_robust": RobustDDPG,
     "td3_robust": RobustTD3,
+    "sac_robust": RobustSAC,
 }
 """Those of this library, and after them those that :func:`register` has added."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from hyuav.learning.algorithms.base import AlgorithmParameters, learning_rate
 from hyuav.learning.algorithms.ddpg import DDPG
+from hyuav.learning.algorithms.sac import SAC
 from hyuav.learning.algorithms.td3 import TD3
 from hyuav.parameters import choice, count, number, parameter, switch
 
@@ -49,3 +50,11 @@ class RobustDDPG(Robust, DDPG):
 @dataclass(frozen=True)
 class RobustTD3(RobustDDPG, TD3):
     """TD3 with the same pieces."""
+
+
+@dataclass(frozen=True)
+class RobustSAC(Robust, SAC):
+    """SAC with the pieces that do not need a deterministic actor."""
+
+    temperature_init: float = parameter(number(1e-6, 1e6), 0.01)
+    target_entropy: float = parameter(number(-100.0, 100.0), -4.0)
