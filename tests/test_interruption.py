@@ -1,18 +1,34 @@
 import os
 import signal
-import threading
+from collections.abc import Iterator
 
 import pytest
 
 from hyuav.errors import Interrupted
 from hyuav.interruption import Interruption, interrupted_by_sigterm
 
-in_main_thread = pytest.mark.skipif(
-    threading.current_thread() is not threading.main_thread(), reason="where signals arrive"
-)
+
+@pytest.fixture
+def _not_ignored() -> Iterator[None]:
+    """Let SIGINT interrupt, which a shell's background process is made to ignore."""
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, former)
 
 
-@in_main_thread
+@pytest.mark.usefixtures("_not_ignored")
+def test_the_first_signal_is_remembered_and_the_second_obeyed() -> None:
+    with Interruption() as interruption:
+        interruption.raise_if_requested("nothing yet")
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert interruption.requested
+        with pytest.raises(KeyboardInterrupt, match="so far") as stopped:
+            interruption.raise_if_requested("so far")
+        assert stopped.value.signal == signal.SIGTERM  # type: ignore[attr-defined]
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
 def test_a_termination_interrupts_and_afterwards_is_one_again() -> None:
     with pytest.raises(Interrupted, match="interrupted") as caught, interrupted_by_sigterm():
         os.kill(os.getpid(), signal.SIGTERM)
@@ -20,7 +36,6 @@ def test_a_termination_interrupts_and_afterwards_is_one_again() -> None:
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
-@in_main_thread
 def test_a_training_inside_is_asked_first_and_stops_when_it_may() -> None:
     with interrupted_by_sigterm(), Interruption() as interruption:
         os.kill(os.getpid(), signal.SIGTERM)
@@ -29,12 +44,12 @@ def test_a_training_inside_is_asked_first_and_stops_when_it_may() -> None:
         interruption.raise_if_requested("after episode 3")
 
 
-@in_main_thread
-def test_a_signal_that_is_ignored_stays_so() -> None:
-    former = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_is_ignored_stays_so(number: signal.Signals) -> None:
+    former = signal.signal(number, signal.SIG_IGN)
     try:
         with interrupted_by_sigterm(), Interruption() as interruption:
-            os.kill(os.getpid(), signal.SIGTERM)
+            signal.raise_signal(number)
         assert not interruption.requested
     finally:
-        signal.signal(signal.SIGTERM, former)
+        signal.signal(number, former)

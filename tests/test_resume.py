@@ -3,10 +3,7 @@
 import dataclasses
 import io
 import math
-import os
 import shutil
-import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,7 +14,6 @@ from faults import small_disk
 from hyuav import InputError
 from hyuav.errors import Halted
 from hyuav.experiment import new_training, resume, train, train_or_resume
-from hyuav.interruption import Interruption
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.tracking.checkpoints import first_checkpoint
 from killed_training import OFF, differences, outcome, small
@@ -200,37 +196,6 @@ def test_a_training_halts_when_no_learner_is_left(tmp_path: Path) -> None:
     assert all(values.isfinite().all() for values in run.best_weights().values())
     accumulated = run.metrics()["loss_critic"].dropna()
     assert all(math.isfinite(loss) for loss in accumulated)
-
-
-@pytest.fixture
-def _not_ignored() -> Iterator[None]:
-    """Let SIGINT interrupt, which a shell's background process is made to ignore."""
-    former = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, former)
-
-
-@pytest.mark.usefixtures("_not_ignored")
-def test_the_first_signal_is_remembered_and_the_second_obeyed() -> None:
-    with Interruption() as interruption:
-        interruption.raise_if_requested("nothing yet")
-        os.kill(os.getpid(), signal.SIGTERM)
-        assert interruption.requested
-        with pytest.raises(KeyboardInterrupt, match="so far") as stopped:
-            interruption.raise_if_requested("so far")
-        assert stopped.value.signal == signal.SIGTERM  # type: ignore[attr-defined]
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-
-
-def test_a_signal_that_is_ignored_stays_so() -> None:
-    former = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with Interruption() as interruption:
-            signal.raise_signal(signal.SIGINT)
-            assert not interruption.requested
-    finally:
-        signal.signal(signal.SIGINT, former)
 
 
 def test_pytorchs_own_generator_is_not_drawn_from(run: RunDirectory) -> None:

@@ -3,6 +3,8 @@
 import contextlib
 import importlib.util
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 from unittest import mock
@@ -59,8 +61,11 @@ def connected(address: str, workers: int, *, prints: bool) -> Iterator[None]:
         options |= {"num_cpus": workers, "include_dashboard": False}
         options["object_store_memory"] = OBJECT_STORE_BYTES
     with _loopback_alone() if address == LOCAL else contextlib.nullcontext():
+        handler = signal.getsignal(signal.SIGTERM)
         try:
             _connect(address, options)
+            if threading.current_thread() is threading.main_thread():
+                signal.signal(signal.SIGTERM, handler)  # Ray's own exits without a word
             yield
         finally:
             ray.shutdown()

@@ -170,6 +170,8 @@ def telling_how_to_go_on(
 ) -> Iterator[None]:
     """Let whoever interrupts what is done inside know the command that goes on with it.
 
+    SIGTERM interrupts it as SIGINT does.
+
     Args:
         overrides: with which to call the same recipe.
         possible: whether anything has begun with which to go on.

@@ -12,6 +12,10 @@ class InputTypeError(InputError, TypeError):
     """A value of a type that is not accepted."""
 
 
+class BusyError(InputError):
+    """A place where another process works."""
+
+
 class Interrupted(KeyboardInterrupt):
     """A signal asked to stop; the message says in one line how far it came.
 

@@ -16,7 +16,7 @@ from omegaconf import OmegaConf
 from torch import Tensor
 
 from hyuav.durable import create_durably
-from hyuav.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav.errors import BusyError, InputError, InputTypeError, rejection, require_choice
 from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
@@ -220,7 +220,7 @@ class RunDirectory:
         Where the file system cannot lock a directory, nobody is kept away.
 
         Raises:
-            InputError: another process trains here.
+            BusyError: another process trains here.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         directory = os.open(self.path, os.O_RDONLY)
@@ -229,7 +229,7 @@ class RunDirectory:
         except BlockingIOError:
             os.close(directory)
             accepted = "one in which no other process trains"
-            raise InputError(rejection("run directory", str(self.path), accepted)) from None
+            raise BusyError(rejection("run directory", str(self.path), accepted)) from None
         except OSError:
             pass
         try:

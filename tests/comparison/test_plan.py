@@ -1,6 +1,6 @@
 """How the learners of a comparison are divided among the workers."""
 
-from hyuav.comparison.plan import Compare
+from hyuav.comparison.plan import Compare, parameters_of
 
 
 def test_learners_are_divided_into_near_equal_shards_that_fit_a_worker() -> None:
@@ -16,3 +16,11 @@ def test_learners_are_divided_into_near_equal_shards_that_fit_a_worker() -> None
 def test_few_learners_are_one_shard() -> None:
     assert Compare(learners=20).parts() == [range(60)]
     assert Compare(learners=1, scheme=("hybrid",)).parts() == [range(1)]
+
+
+def test_a_piece_is_left_out_where_an_algorithm_has_it() -> None:
+    options = Compare(algorithm=("ddpg_robust", "ddpg", "sac"), without=("action_stretch", "clock"))
+    without = ("ddpg_robust-action_stretch", "ddpg_robust-clock")
+    assert options.entries == ("ddpg_robust", *without, "ddpg", "sac")
+    assert parameters_of("ddpg_robust-clock").clock is False
+    assert parameters_of("sac-action_stretch") == parameters_of("sac")

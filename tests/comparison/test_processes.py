@@ -2,10 +2,14 @@
 
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
+
+import pytest
 
 from hyuav.comparison.processes import Workers
 from hyuav.errors import InputError
+from hyuav.interruption import Interruption
 
 
 def divide(number: int) -> None:
@@ -40,13 +44,25 @@ def test_a_process_that_is_killed_takes_no_other_work_with_it() -> None:
 def fall_at_first(file: Path) -> None:
     if not file.exists():
         file.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), signal.Signals[file.name])
 
 
-def test_a_piece_whose_process_is_killed_is_begun_again(tmp_path: Path) -> None:
+def stop_at_first(file: Path) -> None:
+    if not file.exists():
+        file.touch()
+        with Interruption() as interruption:
+            os.kill(os.getpid(), signal.SIGTERM)
+            interruption.raise_if_requested("so far")
+
+
+@pytest.mark.parametrize(
+    ("piece", "name"),
+    [(fall_at_first, "SIGKILL"), (fall_at_first, "SIGTERM"), (stop_at_first, "SIGTERM")],
+)
+def test_a_piece_whose_process_is_killed_is_begun_again(
+    tmp_path: Path, piece: Callable[[Path], None], name: str
+) -> None:
     with Workers(2, retries=1) as workers:
-        assert list(workers.attempt_all(fall_at_first, [tmp_path / "fell"])) == [
-            (tmp_path / "fell", None)
-        ]
+        assert list(workers.attempt_all(piece, [tmp_path / name])) == [(tmp_path / name, None)]
         reasons = dict(workers.attempt_all(divide, [7, 1]))
     assert reasons == {7: "its process was killed, 2 times", 1: None}

@@ -14,7 +14,7 @@ from hyuav import Scenario
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.plan import PEER, parameters_of, training_episodes
 from hyuav.comparison.shards import Shard, tables
-from hyuav.errors import InputError
+from hyuav.errors import BusyError, InputError
 from hyuav.evaluation import EvaluationParameters, Policy, fly
 from hyuav.experiment import new_training
 from hyuav.learning.cohort import Learner
@@ -144,6 +144,25 @@ def test_a_shard_of_this_project_is_a_run(optima: Optima, tmp_path: Path) -> Non
     flights = fly(SCENARIO, "proposed", Policy(last), EVALUATION)
     expected = float(flights.totals["secrecy_sum_rate"].mean())
     assert results["sum_rate"].iloc[3] == pytest.approx(expected, rel=1e-5)
+
+
+def test_what_another_process_trains_is_not_begun_again(optima: Optima, tmp_path: Path) -> None:
+    work = shard(optima, tmp_path)
+    run = RunDirectory.create(tmp_path / "ddpg_campus_T6.partial", work.configuration)
+    with run.reserved(), pytest.raises(BusyError, match="no other process trains"):
+        work.run()
+    assert run.exists
+
+
+def test_a_scheme_whose_optimum_earns_nothing_is_refused_before_training(tmp_path: Path) -> None:
+    deaf = dataclasses.replace(SCENARIO, ue_power=1e-30)
+    optima = Optima(deaf, (6,), EVALUATION.resolution, tmp_path / "deaf.parquet")
+    optima.solve()
+    work = shard(optima, tmp_path / "shards")
+    configuration = dataclasses.replace(work.configuration, scenario=deaf)
+    with pytest.raises(InputError, match="scheme = 'relay': expected one whose optimum earns"):
+        dataclasses.replace(work, configuration=configuration).run()
+    assert not (tmp_path / "shards").exists()
 
 
 def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Flights that are judged before they are flown."""
 
 import dataclasses
+from typing import Any
 
 import pytest
 import torch
@@ -25,17 +26,31 @@ class FarIsBetter(ControlVariate):
         return place[..., :1] * signs, clock
 
 
-@pytest.mark.parametrize("limit", ["box", "disc"])
-def test_the_environment_flies_what_was_imagined(limit: str) -> None:
-    scenario = dataclasses.replace(SCENARIO, speed_limit=limit)
+DEAR = {"jamming_power": 1000.0}  # a helper that may jam has less left to fly
+SMALL = {
+    "map_side": 60.0,
+    "max_speed": 19.0,
+    "helper_start": (-10.0, -10.0),
+    "legitimate_position": (0.0, 0.0),
+    "eavesdropper_position": (20.0, 20.0),
+    "ue_positions": ((5.0, 6.0), (-7.0, 8.0)),
+}
+
+
+@pytest.mark.parametrize("changes", [{}, {"speed_limit": "disc"}, DEAR, SMALL])
+@pytest.mark.parametrize("geofence", [False, True])
+def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofence: bool) -> None:
+    scenario = dataclasses.replace(SCENARIO, **changes)
     schemes = ["hybrid", "relay"]
-    actions, way = Imagination(7, scenario, schemes, CPU).fly(3)
-    assert actions.shape == way.shape == (6, 2, 7, 2)
-    env = make_env(scenario, schemes, (2, 7), seed=0)
-    state = env.reset()
+    actions, way = Imagination(70, scenario, schemes, CPU).fly(3)
+    assert actions.shape == way.shape == (6, 2, 70, 2)
+    env = make_env(scenario, schemes, (2, 70), seed=0, geofence=geofence)
+    state, half_side = env.reset(), scenario.map_side / 2
     for action, place in zip(actions, way, strict=True):
         state = env.step_mdp(env.step(state.set("action", action)))
-        torch.testing.assert_close(state["position"], place * 100.0, atol=1e-3, rtol=0.0)
+        assert not state["off_map"].any()
+        torch.testing.assert_close(state["position"], place * half_side, atol=1e-3, rtol=0.0)
+    assert torch.equal(way[:, 0], way[:, 1]) == (changes != DEAR)
 
 
 def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_reached() -> None:

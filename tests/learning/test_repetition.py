@@ -101,6 +101,12 @@ def test_the_way_of_the_best_flight_is_kept_with_its_actions() -> None:
     torch.testing.assert_close(way[inside], flown[inside])
 
 
+def test_without_repetition_a_memory_may_be_shorter_than_a_flight() -> None:
+    parameters = TrainingParameters(num_episodes=3, replay_size=5, batch_size=4)
+    for episode in Training(SCENARIO, LEARNERS, DDPG(hidden_sizes=(8,)), parameters).episodes():
+        assert episode.accumulated_reward.isfinite().all()
+
+
 def test_a_memory_shorter_than_a_flight_is_refused() -> None:
     parameters = TrainingParameters(num_episodes=2, replay_size=5, batch_size=4)
     with pytest.raises(InputError, match="replay_size = 5: expected at least the 6 slots"):

@@ -76,12 +76,13 @@ def test_a_comparison_too_goes_on_by_the_command_that_it_names(
         *options,
     ]
     command = [sys.executable, str(RECIPES / "compare.py"), *asked, 'output="it"']
-    run, former = "it/shards/ddpg_two_clusters_T5.partial", 0
-    for _ in range(2):
-        code, said, reached = stop(command, tmp_path, signal.SIGTERM, run)
-        assert code == 143
+    run = "it/shards/ddpg_two_clusters_T5.partial"
+    for number, status in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+        code, said, _ = stop(command, tmp_path, number, run)
+        assert code == status
         line = said.splitlines()[-1]
         assert line.startswith("interrupted")
-        assert reached > former
-        command, former = shlex.split(line.partition("; go on with: ")[2]), reached
+        command = shlex.split(line.partition("; go on with: ")[2])
         assert command[1:] == [str(RECIPES / "compare.py"), *asked, 'output="it"']
+    episodes = RunDirectory(tmp_path / run).metrics()["episode"]
+    assert episodes.tolist() == list(range(1, len(episodes) + 1))  # not begun again

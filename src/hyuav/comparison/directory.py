@@ -10,7 +10,7 @@ import pandas as pd
 from omegaconf import OmegaConf
 
 from hyuav.comparison.optima import Optima
-from hyuav.comparison.plan import Compare, parameters_of, training_episodes
+from hyuav.comparison.plan import PEER, PLAIN, Compare, parameters_of, training_episodes
 from hyuav.comparison.shards import CURVES_FILE, RESULTS_FILE, Shard
 from hyuav.comparison.statistics import (
     LAYOUTS,
@@ -22,6 +22,7 @@ from hyuav.comparison.statistics import (
 from hyuav.configuration import Config
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EvaluationParameters
+from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import read_yaml
 from hyuav.runs import RunConfiguration, require_writable
@@ -30,9 +31,6 @@ from hyuav.tracking import LoggerParameters
 
 WORKING = ("workers", "engine", "address", "retries", "output", "logger", "training.cohorts")
 """Entries of the configuration that change how the work is done and not what comes of it."""
-
-UNSAID = {"shard_learners": Compare.shard_learners}
-"""Entries that older comparisons do not name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,7 +116,7 @@ class ComparisonDirectory:
             file.write_text(OmegaConf.to_yaml(request), encoding="utf-8")
             return
         try:
-            asked, kept = _entries(request), _entries(UNSAID | read_yaml(file))
+            asked, kept = _entries(request), self._unsaid | _entries(read_yaml(file))
         except InputError as error:
             accepted = f"a comparison's directory (config.yaml: {error})"
             raise InputError(rejection("output", str(self.path), accepted)) from None
@@ -128,6 +126,16 @@ class ComparisonDirectory:
                     f"a comparison with {name} = {asked.get(name)} (there it is {kept.get(name)})"
                 )
                 raise InputError(rejection("output", str(self.path), accepted))
+
+    @property
+    def _unsaid(self) -> dict[str, Any]:
+        """Entries that older comparisons may not name; what they did not know was off."""
+        plain = {
+            f"hyperparameters.{entry}": ALGORITHMS[PLAIN[name]]().to_dict()
+            for entry in self.options.entries
+            if (name := entry.partition("-")[0]) != PEER
+        }
+        return _entries({"shard_learners": Compare.shard_learners, **plain})
 
     def _shard(self, entry: str, name: str, num_slots: int, part: range) -> Shard:
         learners = self.options.members
@@ -181,7 +189,7 @@ def _entries(config: Config) -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for name, value in config.items():
         if isinstance(value, dict):
-            flat |= {f"{name}.{key}": entry for key, entry in value.items()}
+            flat |= {f"{name}.{key}": entry for key, entry in _entries(value).items()}
         else:
             flat[name] = value
     return {name: value for name, value in flat.items() if not name.startswith(WORKING)}

@@ -145,15 +145,15 @@ def parameters_of(entry: str) -> AlgorithmParameters:
 
     Args:
         entry: of :data:`ENTRIES`, or with a piece of :data:`PIECES` behind a hyphen, which is then
-            as in the plain algorithm.
+            as in the plain algorithm; one that the algorithm does not have changes nothing.
     """
     name, _, piece = entry.partition("-")
     if name == PEER:
         return DDPG()
     parameters: AlgorithmParameters = ALGORITHMS[name]()
-    if not piece:
+    if not hasattr(parameters, piece):
         return parameters
-    plain = getattr(ALGORITHMS[PLAIN[name]](), piece, getattr(parameters, piece, None))
+    plain = getattr(ALGORITHMS[PLAIN[name]](), piece, getattr(parameters, piece))
     return type(parameters).from_dict({**parameters.to_dict(), piece: plain})
 
 

@@ -73,7 +73,7 @@ class Workers:
             for tries in itertools.count(1):
                 try:
                     return process.submit(attempt, function, piece).result()
-                except BrokenProcessPool:
+                except (BrokenProcessPool, KeyboardInterrupt, SystemExit):  # of the worker
                     process.shutdown()
                     process = _process()
                     if tries > self._retries or self._is_ending:

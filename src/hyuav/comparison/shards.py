@@ -12,7 +12,7 @@ from rich.console import Console
 
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.plan import PEER, training_episodes
-from hyuav.errors import Halted, InputError
+from hyuav.errors import BusyError, Halted, InputError, rejection
 from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
 from hyuav.experiment import LEARNED, learned_policies, resume, train
 from hyuav.runs import RunConfiguration, RunDirectory
@@ -59,7 +59,13 @@ class Shard:
         return (self.path / RESULTS_FILE).is_file()
 
     def run(self) -> None:
-        """Train, evaluate and keep everything; a broken attempt goes on from its checkpoint."""
+        """Train, evaluate and keep everything; a broken attempt goes on from its checkpoint.
+
+        Raises:
+            InputError: a scheme's optimum earns nothing, or another process trains there.
+        """
+        for scheme in dict.fromkeys(own.scheme for own in self.configuration.learners):
+            _optimum(self, scheme, self.evaluation)
         partial = self.path.with_name(f"{self.name}.partial")
         if self.entry == PEER:
             from hyuav.comparison import stable_baselines  # needs a library that is optional
@@ -99,6 +105,8 @@ def _go_on(shard: Shard, directory: Path) -> bool:
         if _comparable(run.configuration()) != _comparable(shard.configuration):
             return False
         resume(directory, *_reporting(shard), logs=_logs(shard))
+    except BusyError:  # whose files must not be taken away
+        raise
     except InputError:  # no checkpoint yet, or one that cannot be read
         return False
     return True
@@ -199,8 +207,12 @@ def tables(
 
 
 def _optimum(shard: Shard, scheme: str, episodes: EvaluationParameters) -> float:
-    """What the best flight earns in these episodes, in bps/Hz."""
+    """What the best flight earns in these episodes, in bps/Hz; it must be something."""
     scenario = shard.configuration.scenario
     policy = shard.optima.policy(scheme, scenario.num_slots)
     flights = fly(scenario, OPTIMA[scheme], policy, episodes)
-    return float(flights.totals["secrecy_sum_rate"].mean())
+    earned = float(flights.totals["secrecy_sum_rate"].mean())
+    if not earned:
+        accepted = f"one whose optimum earns something (T = {scenario.num_slots})"
+        raise InputError(rejection("scheme", scheme, accepted))
+    return earned

@@ -34,6 +34,10 @@ class OffMapPenalty(Transform):
         return next_tensordict
 
 
+WITHIN = 1.0 - 1e-6
+"""Of half the map's side, as near to the edge as flights should end: rounding leads no further."""
+
+
 def fenced(scenario: Scenario, position: Tensor, action: Tensor) -> Tensor:
     """Bound each component of an action (..., 2) so that the flight ends on the map.
 
@@ -43,7 +47,7 @@ def fenced(scenario: Scenario, position: Tensor, action: Tensor) -> Tensor:
         action: velocity in units of v_max.
     """
     reach = scenario.max_speed * scenario.slot_duration
-    edge = scenario.map_side / 2 * (1.0 - 1e-6)  # so that rounding leads nowhere else
+    edge = scenario.map_side / 2 * WITHIN
     return action.maximum((-edge - position) / reach).minimum((edge - position) / reach)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from hyuav.envs.transforms import WITHIN
 from hyuav.learning.control_variate import ControlVariate
 from hyuav.learning.exploration import EVENLY, destinations
 from hyuav.learning.repetition import BestFlights
@@ -62,7 +63,7 @@ class Imagination:
         reach = scenario.max_speed * scenario.slot_duration
         places = self._places + len(self._places) * episode
         share = torch.stack([torch.frac(places * multiple) for multiple in EVENLY], dim=-1)
-        destination = destinations(share.float()) * half_side
+        destination = destinations(share.float()) * (half_side * WITHIN)
         start = torch.tensor(scenario.helper_start, dtype=torch.float32, device=self._device)
         position = start.expand(self._learners, len(places), 2)
         actions, way = [], []

@@ -8,6 +8,7 @@ import torch
 
 from hyuav.errors import InputError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
+from hyuav.learning.control_variate import HIDDEN_SIZES
 
 COPIES = 16
 """Of the weights of the largest network: networks, targets, moments, gradients and best weights."""
@@ -37,6 +38,7 @@ def require_memory(
     """
     learners, observed = len(horizons), num_ues + 6
     faded = (3 * num_ues + 2) * algorithm.control_variate
+    imagined = algorithm.imagined_flights * algorithm.control_variate
     inputs = 2 * observed if algorithm.afterstate else observed + 2
     layers = (inputs, *algorithm.hidden_sizes, 2)
     widths = sum(layers)
@@ -46,11 +48,17 @@ def require_memory(
         "batch_size": learners * sizes["batch_size"] * 2 * widths,
         "evaluation_episodes": learners * sizes["evaluation_episodes"] * 4 * observed,
         "num_slots": 4 * sum(horizons),
+        "imagined_flights": sum(horizons) * imagined * 2 * (2 * observed + HIDDEN_SIZES[0]),
     }
     available = device_memory(device)
     if _FLOAT * sum(needed.values()) > available:
         name = max(needed, key=needed.__getitem__)
-        value = {"hidden_sizes": list(algorithm.hidden_sizes), "num_slots": max(horizons)} | sizes
+        value = {
+            "hidden_sizes": list(algorithm.hidden_sizes),
+            "num_slots": max(horizons),
+            "imagined_flights": algorithm.imagined_flights,
+            **sizes,
+        }
         accepted = (
             f"a training of {learners} learners that fits the device's "
             f"{available / 2**30:.3g} GiB: this one takes about "

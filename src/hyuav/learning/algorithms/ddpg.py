@@ -66,7 +66,7 @@ class DDPG(AlgorithmParameters):
             actor=actor,
             explorer=TensorDictSequential(actor, self.noise(learners)),
             loss=loss,
-            best_flights=flights,
+            best_flights=flights if self.keeps_flights else None,
             steps=(
                 GradientStep("critic", lambda batch: loss.loss_value(batch)[0], critic_optimizer),
                 GradientStep(

@@ -46,7 +46,7 @@ class TD3(DDPG):
             actor=actor,
             explorer=TensorDictSequential(actor, self.noise(learners)),
             loss=loss,
-            best_flights=flights,
+            best_flights=flights if self.keeps_flights else None,
             steps=(
                 GradientStep(
                     "critic",
