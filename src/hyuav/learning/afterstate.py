@@ -20,6 +20,8 @@ class Afterstate(nn.Module):
     covered there changes the reward in steps a few metres apart, too narrow to be learned from
     distances; so coverage is shown as well, as a tanh of the distance to its edge.
 
+    Where the budget E_H bounds the speed, it is the hybrid scheme's bound that counts.
+
     Args:
         scenario: its nodes, speed limit and map.
         clock: whether the slots flown are observed.
