@@ -14,6 +14,12 @@ from hyuav.comparison.statistics import NEAR_OPTIMAL
 from hyuav.metrics import finite_numbers
 from hyuav.terminal import print_table, results_table
 
+LABEL_WIDTH = 14
+"""Of the column of the algorithms; longer names go on in the next line."""
+
+MOST_COLUMNS = 5
+"""Of a table of pairs; where there are more algorithms, each is set beside the first alone."""
+
 
 def label(entry: str) -> str:
     """An entry's name in tables and figures."""
@@ -73,6 +79,7 @@ def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:
         "Algorithm",
         *("Scheme", "IQM", "worst", f">= {_percent(threshold)}", "episodes", "seconds"),
     )
+    table.columns[0].max_width, table.columns[0].no_wrap = LABEL_WIDTH, False
     table.columns[1].justify = "left"
     for scheme, own in cells.groupby("scheme", sort=False):
         for _, cell in own.iterrows():
@@ -95,6 +102,7 @@ def _algorithms(name: str, algorithms: pd.DataFrame, threshold: float) -> Table:
         "Algorithm",
         *("lear-\nners", "IQM", "median", "worst", *shares, "seconds"),
     )
+    table.columns[0].max_width, table.columns[0].no_wrap = LABEL_WIDTH, False
     for _, row in algorithms.iterrows():
         table.add_row(
             label(row["algorithm"]),
@@ -109,13 +117,14 @@ def _algorithms(name: str, algorithms: pd.DataFrame, threshold: float) -> Table:
 
 def _improvements(improvements: pd.DataFrame) -> Table:
     names = list(dict.fromkeys(improvements["algorithm"]))
-    table = results_table("P(row better than column)", "Algorithm", *map(label, names))
+    others = names if len(names) <= MOST_COLUMNS else names[:1]
+    table = results_table("P(row better than column)", "Algorithm", *map(label, others))
     table.caption = "* 50 % is outside the\n95 % interval"
     table.caption_justify = "left"
     pairs = improvements.set_index(["algorithm", "other"])
     for name in names:
         cells = []
-        for other in names:
+        for other in others:
             if (name, other) not in pairs.index:
                 cells.append("-")
                 continue
