@@ -21,7 +21,7 @@ from hyuav.comparison.directory import ComparisonDirectory
 from hyuav.comparison.plan import Compare, require_libraries
 from hyuav.comparison.tables import print_tables
 from hyuav.comparison.work import work_off
-from hyuav.configuration import Config, override, recipe, section, telling_how_to_go_on
+from hyuav.configuration import Config, recipe, same_call, section, telling_how_to_go_on
 from hyuav.evaluation import EvaluationParameters
 from hyuav.learning.training import TrainingParameters
 from hyuav.report.page import write_comparison_report
@@ -41,8 +41,7 @@ from hyuav.tracking import LoggerParameters, log_comparison
 )
 def main(config: Config, directory: Path) -> None:
     """Do what is missing of the comparison; told to stop, say how to go on."""
-    again = [each for each in sys.argv[1:] if not each.startswith("output=")]
-    with telling_how_to_go_on(*again, override("output", directory)):
+    with telling_how_to_go_on(*same_call("output", directory)):
         compare(config, directory)
 
 

@@ -12,7 +12,6 @@ python recipes/reproduce.py hydra.run.dir=runs/NAME
 import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
 
 import dataclasses
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -22,7 +21,7 @@ import torch
 from rich.console import Console
 from torch import Tensor
 
-from hyuav.configuration import Config, override, recipe, section, telling_how_to_go_on
+from hyuav.configuration import Config, recipe, same_call, section, telling_how_to_go_on
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
 from hyuav.experiment import (
@@ -93,8 +92,7 @@ class Reproduce(Parameters):
 )
 def main(config: Config, directory: Path) -> None:
     """Do the main job; the same directory again goes on where it was interrupted."""
-    again = [each for each in sys.argv[1:] if not each.startswith("hydra.run.dir=")]
-    with telling_how_to_go_on(*again, override("hydra.run.dir", directory)):
+    with telling_how_to_go_on(*same_call("hydra.run.dir", directory)):
         reproduce(config, directory)
 
 

@@ -195,6 +195,17 @@ def telling_how_to_go_on(
         raise Halted(f"{error}; {hint}") from None
 
 
+def same_call(name: str, path: Path) -> list[str]:
+    """The overrides of this call, with an entry set to a path.
+
+    Args:
+        name: of the entry.
+        path: as :func:`override` takes it.
+    """
+    others = (each for each in sys.argv[1:] if not each.startswith(f"{name}="))
+    return [*others, override(name, path)]
+
+
 def override(name: str, path: Path) -> str:
     """What sets an entry to a path on the command line, in quotation marks where it needs them.
 

@@ -13,9 +13,9 @@ from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.control_variate import ControlVariate
 from hyuav.learning.imagination import Imagination
 from hyuav.learning.repetition import BestFlights
+from hyuav.system import SecureOffloadingSystem
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
-CPU = torch.device("cpu")
 
 
 class FarIsBetter(ControlVariate):
@@ -42,7 +42,7 @@ SMALL = {
 def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofence: bool) -> None:
     scenario = dataclasses.replace(SCENARIO, **changes)
     schemes = ["hybrid", "relay"]
-    actions, way = Imagination(70, scenario, schemes, CPU).fly(3)
+    actions, way = Imagination(70, SecureOffloadingSystem(scenario), schemes).fly(3)
     assert actions.shape == way.shape == (6, 2, 70, 2)
     env = make_env(scenario, schemes, (2, 70), seed=0, geofence=geofence)
     state, half_side = env.reset(), scenario.map_side / 2
@@ -54,7 +54,8 @@ def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofen
 
 
 def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_reached() -> None:
-    imagination = Imagination(50, dataclasses.replace(SCENARIO, num_slots=10), ["hybrid"], CPU)
+    system = SecureOffloadingSystem(dataclasses.replace(SCENARIO, num_slots=10))
+    imagination = Imagination(50, system, ["hybrid"])
     ends = torch.stack([imagination.fly(episode)[1][-1, 0] for episode in range(40)]).flatten(0, 1)
     assert len(ends.unique(dim=0)) > 0.5 * len(ends)  # those at the edges coincide
     for corner in ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 0.0), (-0.5, 0.6)):
@@ -63,7 +64,7 @@ def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_
 
 def test_of_the_flights_the_one_of_which_most_is_expected_becomes_each_learners_best() -> None:
     best = BestFlights(2, SCENARIO)
-    imagination = Imagination(40, SCENARIO, ["hybrid", "hybrid"], CPU)
+    imagination = Imagination(40, SecureOffloadingSystem(SCENARIO), ["hybrid", "hybrid"])
     variate = FarIsBetter(2, SCENARIO, 1.0, clock=True)
     imagination.improve(best, variate, 1)
     actions, way = imagination.fly(1)
@@ -100,7 +101,7 @@ def test_what_was_imagined_is_flown_after_the_warm_up(
     if compiled:
         trained.compile()
     trained.fly()
-    actions, way = Imagination(100, SCENARIO, ["jamming"], CPU).fly(3)
+    actions, way = Imagination(100, SecureOffloadingSystem(SCENARIO), ["jamming"]).fly(3)
     farthest = (way[:, 0, :, 0].sum(dim=0) + way[-1, 0, :, 1]).argmax()
     stored = trained.replay.storage._storage["action"][18:24, 0]
     torch.testing.assert_close(stored, actions[:, 0, farthest])

@@ -168,7 +168,7 @@ def test_a_straight_flight_too_fast_for_the_horizon_is_left_out_and_named(
 REFUSALS = [
     (
         ["train", "algorithm=ppo"],
-        "algorithm = 'ppo': expected one of ddpg, ddpg_robust, sac, sac_robust, td3, td3_robust",
+        f"algorithm = 'ppo': expected one of {NAMES}",
     ),
     (["train", "scenario=square"], "scenario = 'square': expected one of"),
     (["train", "scenario.ue_powr=1"], "scenario: unknown field 'ue_powr': did you mean 'ue_power'"),

@@ -153,7 +153,7 @@ def parameters_of(entry: str) -> AlgorithmParameters:
     parameters: AlgorithmParameters = ALGORITHMS[name]()
     if not hasattr(parameters, piece):
         return parameters
-    plain = getattr(ALGORITHMS[PLAIN[name]](), piece, getattr(parameters, piece))
+    plain = getattr(ALGORITHMS[PLAIN[name]](), piece)
     return type(parameters).from_dict({**parameters.to_dict(), piece: plain})
 
 

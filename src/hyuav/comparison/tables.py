@@ -72,14 +72,19 @@ def print_tables(summary: Summary, threshold: float, console: Console) -> None:
         console.print(line, soft_wrap=True, markup=False, highlight=False)
 
 
+def _table(title: str, *headings: str) -> Table:
+    """One with a row for each algorithm and little room for its name."""
+    table = results_table(title, "Algorithm", *headings)
+    table.columns[0].max_width, table.columns[0].no_wrap = LABEL_WIDTH, False
+    return table
+
+
 def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:
-    table = results_table(
+    table = _table(
         f"{name}, % of the optimum: interquartile mean and\n"
         f"95 % interval; medians until {_percent(threshold)} was reached first",
-        "Algorithm",
         *("Scheme", "IQM", "worst", f">= {_percent(threshold)}", "episodes", "seconds"),
     )
-    table.columns[0].max_width, table.columns[0].no_wrap = LABEL_WIDTH, False
     table.columns[1].justify = "left"
     for scheme, own in cells.groupby("scheme", sort=False):
         for _, cell in own.iterrows():
@@ -97,12 +102,10 @@ def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:
 
 def _algorithms(name: str, algorithms: pd.DataFrame, threshold: float) -> Table:
     shares = (f">=\n{_percent(share)}" for share in (NEAR_OPTIMAL, threshold))
-    table = results_table(
+    table = _table(
         f"{name}, % of the optimum: interquartile mean and 95 % interval",
-        "Algorithm",
         *("lear-\nners", "IQM", "median", "worst", *shares, "seconds"),
     )
-    table.columns[0].max_width, table.columns[0].no_wrap = LABEL_WIDTH, False
     for _, row in algorithms.iterrows():
         table.add_row(
             label(row["algorithm"]),

@@ -13,6 +13,9 @@ from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.parameters import switch
 from hyuav.scenario import Scenario
 
+WITHIN = 1.0 - 1e-6
+"""Of half the map's side, as near to the edge as flights should end: rounding leads no further."""
+
 
 class OffMapPenalty(Transform):
     """Subtract r_om from the reward of every slot in which the flight would have left the map.
@@ -32,10 +35,6 @@ class OffMapPenalty(Transform):
         penalty = self.penalty * next_tensordict["off_map"]
         next_tensordict["reward"] = next_tensordict["reward"] - penalty
         return next_tensordict
-
-
-WITHIN = 1.0 - 1e-6
-"""Of half the map's side, as near to the edge as flights should end: rounding leads no further."""
 
 
 def fenced(scenario: Scenario, position: Tensor, action: Tensor) -> Tensor:

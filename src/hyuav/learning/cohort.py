@@ -90,7 +90,7 @@ class Cohort:
             draw_weights(self.algorithm.control_variate, seeds, "control variate")
         imagined = algorithm.imagined_flights
         self._imagination = (
-            Imagination(imagined, scenario, schemes, self.env.device) if imagined else None
+            Imagination(imagined, self.env.base_env.system, schemes) if imagined else None
         )
         self._streams = self._random_streams(seeds)
         self.replay = make_replay(

@@ -9,7 +9,6 @@ from hyuav.envs.transforms import WITHIN
 from hyuav.learning.control_variate import ControlVariate
 from hyuav.learning.exploration import EVENLY, destinations
 from hyuav.learning.repetition import BestFlights
-from hyuav.scenario import Scenario
 from hyuav.system import SecureOffloadingSystem
 
 
@@ -23,23 +22,21 @@ class Imagination:
 
     Args:
         flights: D, of which the best is looked for at once.
-        scenario: that is flown.
+        system: that is flown.
         schemes: of the N learners.
-        device: of all tensors.
     """
 
     def __init__(
-        self, flights: int, scenario: Scenario, schemes: Sequence[str], device: torch.device
+        self, flights: int, system: SecureOffloadingSystem, schemes: Sequence[str]
     ) -> None:
-        self._scenario, self._device = scenario, device
-        self._places = torch.arange(flights, dtype=torch.float64, device=device)
-        self._system = SecureOffloadingSystem(scenario, device)
-        limit = self._system.norm_limit(schemes)
+        self._system = system
+        self._places = torch.arange(flights, dtype=torch.float64, device=system.device)
+        limit = system.norm_limit(schemes)
         self._norm_limit = None if limit is None else limit.unsqueeze(1)
         self._learners = len(schemes)
 
     def improve(self, best: BestFlights, variate: ControlVariate, episode: int) -> None:
-        """Put an imagined flight in place of the best one of which less is to be expected.
+        """Let an imagined flight be the best where more is to be expected of it.
 
         Args:
             best: of each learner.
@@ -58,14 +55,13 @@ class Imagination:
         Returns:
             the actions (T, N, D, 2), and where they lead, in units of half the map's side.
         """
-        scenario = self._scenario
+        scenario = self._system.scenario
         half_side = scenario.map_side / 2
         reach = scenario.max_speed * scenario.slot_duration
         places = self._places + len(self._places) * episode
         share = torch.stack([torch.frac(places * multiple) for multiple in EVENLY], dim=-1)
-        destination = destinations(share.float()) * (half_side * WITHIN)
-        start = torch.tensor(scenario.helper_start, dtype=torch.float32, device=self._device)
-        position = start.expand(self._learners, len(places), 2)
+        destination = destinations(share.to(self._system.dtype)) * (half_side * WITHIN)
+        position = self._system.helper_start.expand(self._learners, len(places), 2)
         actions, way = [], []
         for _ in range(scenario.num_slots):
             action = ((destination - position) / reach).clamp(-1.0, 1.0)

@@ -60,8 +60,8 @@ class AlgorithmParameters(Parameters, ABC):
     warm_up_episodes: int = parameter(count(0), 0)
     """Flown to places all over the map; see :class:`hyuav.learning.exploration.WarmUp`."""
     repeat_every: int = parameter(count(0), 0)
-    """After the warm-up, and until actors restart, every n-th episode repeats the best flight so
-    far; 0 for never. See :class:`hyuav.learning.repetition.BestFlights`."""
+    """After the warm-up, and until actors restart, every n-th episode takes the actions of the best
+    flight so far; 0 for never. See :class:`hyuav.learning.repetition.BestFlights`."""
     restart_after: int = parameter(count(0), 0)
     """Episodes from which on an actor that is evaluated and found worse than it was goes on from
     its best weights; 0 for never."""
@@ -210,7 +210,7 @@ class Algorithm:
         return 0 < self.parameters.restart_after <= episode
 
     def repeats(self, episode: int) -> bool:
-        """Whether an episode, from 1, is the best flight so far once more."""
+        """Whether an episode, from 1, takes the actions of the best flight so far."""
         every = self.parameters.repeat_every
         explores = episode > self.parameters.warm_up_episodes and not self.restarts(episode)
         return every > 0 and episode % every == 0 and explores

@@ -143,14 +143,14 @@ class DDPG(AlgorithmParameters):
         self, loss: LossModule, flights: BestFlights, batch: TensorDictBase
     ) -> Tensor | float:
         """What is added to the actor's loss, so that it does not stick: (N, K)."""
-        added: Tensor | float = 0.0
         if not (self.saturation_penalty or self.alternatives_weight):
-            return added
+            return 0.0
         observation = batch["observation"]
         with loss.actor_network_params.to_module(loss.actor_network, preserve_module_state=False):
             network = loss.actor_network.module
             output = network.before_output(observation)
             action = network.output(output)
+        added: Tensor | float = 0.0
         if self.saturation_penalty:
             added = added + self.saturation_penalty * saturation(output)
         if self.alternatives_weight:
