@@ -107,7 +107,7 @@ class SecureOffloadingSystem:
             scenario.num_ues * scenario.task_size[1] * scenario.cycles_per_bit[1]
         ) / scenario.slot_duration
         spent = energy.computation_energy(
-            torch.tensor(frequency, dtype=torch.float64),
+            torch.tensor(frequency, dtype=torch.float64, device=self.device),
             scenario.capacitance,
             scenario.slot_duration,
         )

@@ -26,12 +26,16 @@ def diagnostics_spec(batch_size: torch.Size, num_ues: int, device: torch.device)
     """
     per_ue, per_slot = (*batch_size, num_ues), (*batch_size, 1)
     scalars = ("relay_sum_rate", "jamming_sum_rate", "edge_load", "edge_energy", "helper_energy")
+
+    def numbers(shape: tuple[int, ...], dtype: torch.dtype = torch.float32) -> Unbounded:
+        return Unbounded(shape, dtype=dtype, device=device)
+
     return Composite(
-        offloading=Binary(num_ues, per_ue, dtype=torch.bool),
-        secrecy_rate=Unbounded(per_ue, dtype=torch.float32),
-        ue_energy=Unbounded(per_ue, dtype=torch.float32),
-        budget_violation=Unbounded(per_slot, dtype=torch.int64),
-        **{name: Unbounded(per_slot, dtype=torch.float32) for name in scalars},
+        offloading=Binary(num_ues, per_ue, dtype=torch.bool, device=device),
+        secrecy_rate=numbers(per_ue),
+        ue_energy=numbers(per_ue),
+        budget_violation=numbers(per_slot, torch.int64),
+        **{name: numbers(per_slot) for name in scalars},
         shape=batch_size,
         device=device,
     )

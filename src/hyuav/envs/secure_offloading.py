@@ -123,37 +123,40 @@ class SecureOffloadingEnv(EnvBase):
         return self._per_row(torch.tensor(flags, device=self.device))
 
     def _make_specs(self) -> None:
-        batch, half = self.batch_size, self.scenario.map_side / 2
+        batch, half, device = self.batch_size, self.scenario.map_side / 2, self.device
+
+        def flag() -> Binary:
+            return Binary(1, (*batch, 1), dtype=torch.bool, device=device)
+
+        def numbers(width: int) -> Unbounded:
+            return Unbounded((*batch, width), dtype=torch.float32, device=device)
+
         self.observation_spec = Composite(
-            position=Bounded(-half, half, (*batch, 2), dtype=torch.float32),
-            mode=Categorical(2, (*batch, 1), dtype=torch.int64),
-            distances=Unbounded((*batch, self.scenario.num_ues + 2), dtype=torch.float32),
-            off_map=Binary(1, (*batch, 1), dtype=torch.bool),
+            position=Bounded(-half, half, (*batch, 2), dtype=torch.float32, device=device),
+            mode=Categorical(2, (*batch, 1), dtype=torch.int64, device=device),
+            distances=numbers(self.scenario.num_ues + 2),
+            off_map=flag(),
             shape=batch,
-            device=self.device,
+            device=device,
         )
         if self.tells_fading:
-            powers = (*batch, 3 * self.scenario.num_ues + 2)
-            self.observation_spec["fading"] = Unbounded(powers, dtype=torch.float32)
+            self.observation_spec["fading"] = numbers(3 * self.scenario.num_ues + 2)
         if self.diagnostics:
             self.observation_spec["diagnostics"] = diagnostics_spec(
-                batch, self.scenario.num_ues, self.device
+                batch, self.scenario.num_ues, device
             )
         # What a step reads besides the action; a reset may be given it too.
         self.state_spec = Composite(
-            position=self.observation_spec["position"].clone(), shape=batch, device=self.device
+            position=self.observation_spec["position"].clone(), shape=batch, device=device
         )
         if self.diagnostics:
             edge_load = self.observation_spec["diagnostics", "edge_load"].clone()
-            self.state_spec["diagnostics"] = Composite(edge_load=edge_load, shape=batch)
-        self.action_spec = Bounded(-1.0, 1.0, (*batch, 2), dtype=torch.float32, device=self.device)
-        self.reward_spec = Unbounded((*batch, 1), dtype=torch.float32, device=self.device)
-        self.done_spec = Composite(
-            done=Binary(1, (*batch, 1), dtype=torch.bool),
-            terminated=Binary(1, (*batch, 1), dtype=torch.bool),
-            shape=batch,
-            device=self.device,
-        )
+            self.state_spec["diagnostics"] = Composite(
+                edge_load=edge_load, shape=batch, device=device
+            )
+        self.action_spec = Bounded(-1.0, 1.0, (*batch, 2), dtype=torch.float32, device=device)
+        self.reward_spec = numbers(1)
+        self.done_spec = Composite(done=flag(), terminated=flag(), shape=batch, device=device)
 
     def _set_seed(self, seed: int | None) -> None:
         self.draws = BatchDraws(self.system, self.batch_size, as_seed(seed))

@@ -127,13 +127,14 @@ class CompiledSlots:
 
         The first is multiplied by the factor of the episode's learning rates.
         """
-        index = torch.arange(updates + 1, updates + slots + 1, dtype=torch.float64).unsqueeze(-1)
-        every = torch.tensor([float(step.every) for step in self._algorithm.steps])
+        exact = {"dtype": torch.float64, "device": self._env.device}
+        index = torch.arange(updates + 1, updates + slots + 1, **exact).unsqueeze(-1)
+        every = torch.tensor([step.every for step in self._algorithm.steps], **exact)
         betas = [self._adam[step.name].betas for step in self._algorithm.steps]
-        powers = torch.tensor(betas, dtype=torch.float64) ** (index // every).unsqueeze(-1)
+        powers = torch.tensor(betas, **exact) ** (index // every).unsqueeze(-1)
         first, second = (1.0 / (1.0 - powers)).unbind(dim=-1)
         first = first * self._algorithm.learning_rate_factor(episode)
-        return torch.stack([first, second.sqrt()], dim=-1).float().to(self._env.device)
+        return torch.stack([first, second.sqrt()], dim=-1).float()
 
     def _examples(self, batch_size: int) -> dict[str, Tensor]:
         """Tensors of the shapes in which a slot's random numbers come."""

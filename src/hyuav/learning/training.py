@@ -176,8 +176,8 @@ class Training:
 
     def _in_order(self, values: Sequence[Tensor]) -> Tensor:
         """Values (n,) of each cohort as those of all learners (N,)."""
-        order = torch.tensor([index for members in self._members for index in members])
-        return torch.cat(list(values)).cpu()[order.argsort()]
+        order = [index for members in self._members for index in members]
+        return torch.cat(list(values)).cpu()[sorted(range(len(order)), key=order.__getitem__)]
 
     def _join(self, weights: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
         by_learner = {

@@ -37,7 +37,8 @@ def draw_weights(module: nn.Module, seeds: Sequence[int], stream: str) -> None:
         bound = networks[f"{layer}.weight"].shape[-2] ** -0.5
         for learner, generator in enumerate(generators):
             own = values.data.select(-3, learner)
-            own.copy_(torch.empty(own.shape).uniform_(-bound, bound, generator=generator))
+            drawn = torch.empty(own.shape, device=generator.device)  # alike on every device
+            own.copy_(drawn.uniform_(-bound, bound, generator=generator))
     for name, target in module.named_buffers():
         if name.startswith("target_"):
             target.copy_(networks[name.removeprefix("target_")].data)
