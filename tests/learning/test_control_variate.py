@@ -101,11 +101,25 @@ def test_each_learner_has_a_control_variate_of_its_own_that_learns() -> None:
         trained = Cohort(scenario, learners, algorithm, 40, 8, None)
         for _ in range(episodes):
             trained.fly()
-        variate = trained.algorithm.control_variate
-        assert variate is not None
-        return torch.cat([each.detach().flatten(1) for each in variate.parameters()], dim=1)
+        expectation = trained.algorithm.expectation
+        assert expectation is not None
+        return torch.cat([each.detach().flatten(1) for each in expectation.parameters()], dim=1)
 
     begun, later = weights([3, 4], 1), weights([3, 4], 4)
     assert not torch.equal(begun[0], begun[1])
     assert not torch.equal(begun, later)
     torch.testing.assert_close(weights([4], 4)[0], later[1])
+
+
+def test_evaluations_are_told_without_their_luck_and_with_the_same_mean() -> None:
+    scenario = dataclasses.replace(SCENARIO, num_slots=4)
+    algorithm = DDPG(hidden_sizes=(8,), control_variate=True, reward_scale=0.1)
+    trained = Cohort(scenario, [Learner("relay", 0)], algorithm, 400, 50, None)
+    for _ in range(60):
+        trained.fly()
+    earned = [trained.evaluate(20, seed) for seed in range(60)]
+    fair = torch.cat([own.reward for own in earned])
+    lucky = torch.cat([own.sum_rate for own in earned])
+    assert fair.std() < 0.7 * lucky.std()
+    assert abs((fair - lucky).mean()) < 4.0 * (fair - lucky).std() / 60**0.5
+    assert earned[0].way.shape == (4, 1, 2)

@@ -5,6 +5,8 @@ import torch
 from tensordict import TensorDict
 from torch import nn
 
+from hyuav import Scenario
+from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.networks import (
     LearnerLinear,
     LearnerMLP,
@@ -78,3 +80,20 @@ def test_normalized_layers_do_not_depend_on_the_scale_of_their_inputs() -> None:
     network.get_parameter("layers.0.bias").data.zero_()
     inputs = torch.randn(1, 5, 3)
     torch.testing.assert_close(network(inputs), network(10.0 * inputs), rtol=1e-3, atol=1e-4)
+
+
+def test_a_critic_counts_of_each_ue_what_is_covered() -> None:
+    scenario = Scenario.preset("two_clusters")
+    afterstate = Afterstate(scenario, clock=False, geofence=False)
+    critic = make_critic(1, 15, (8,), "tanh", afterstate=afterstate).module
+    for weight in critic.network.parameters():
+        weight.data.zero_()
+    worth = torch.tensor([0.5, *range(1, 11)])  # always, then of each UE
+    critic.network.get_parameter("layers.2.bias").data[0, 0] = worth
+    places = torch.tensor([[[0.9, 0.9], [-0.25, 0.2], [0.23, -0.22]]])
+    observation = torch.cat([places, torch.zeros(1, 3, 13)], dim=-1)
+    values = critic(observation, torch.zeros(1, 3, 2)).squeeze()
+    first, second = worth[1:8].sum(), worth[8:].sum()  # of the clusters
+    torch.testing.assert_close(
+        values, 0.5 + torch.stack([0.0 * first, first, second]), atol=0.1, rtol=0.0
+    )

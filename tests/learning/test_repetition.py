@@ -50,8 +50,8 @@ def test_every_nth_episode_takes_the_actions_of_each_learners_best(compiled: boo
             repeated.append(episode)
         rewards.append(reward)
         flights.append(flown(trained))
-    assert repeated == [3, 6, 9, 12]
-    assert not torch.equal(flights[14], flights[11])
+    assert repeated == [3, 6, 9, 12, 15]
+    assert not torch.equal(flights[13], flights[11])
 
 
 def test_without_repetition_no_flight_is_flown_twice() -> None:

@@ -33,7 +33,8 @@ class Afterstate(nn.Module):
         self._system = SecureOffloadingSystem(scenario, torch.get_default_device())
         self._norm_limit = self._system.norm_limit(["hybrid"])
         self._clock, self._geofence = clock, geofence
-        self.size = 2 * scenario.num_ues + 5 + clock
+        self.num_ues = scenario.num_ues
+        self.size = 2 * self.num_ues + 5 + clock
 
     def forward(self, observation: Tensor, action: Tensor) -> Tensor:
         """Map observations (..., U + 5) and actions (..., 2) to features (..., 2 U + 5).
@@ -59,6 +60,11 @@ class Afterstate(nn.Module):
         """
         position = place * (self._system.scenario.map_side / 2)
         return self._features(position, torch.full_like(clock, -1.0), clock)
+
+    def coverage(self, features: Tensor) -> Tensor:
+        """How far the helper covers each UE there, from 0 to 1: (..., U), of features (..., F)."""
+        shown = features[..., self.num_ues + 4 : 2 * self.num_ues + 4]
+        return 0.5 * (shown + 1.0)
 
     def _features(self, position: Tensor, beside: Tensor, clock: Tensor) -> Tensor:
         scenario = self._system.scenario

@@ -13,8 +13,9 @@ from torchrl.collectors import Collector
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.imagination import Imagination
-from hyuav.learning.repetition import BestFlights, as_planned
+from hyuav.learning.repetition import as_planned
 from hyuav.learning.replay import clear_unused, forget, latest, make_replay
+from hyuav.learning.search import FlightSearch
 from hyuav.learning.slots import CompiledSlots
 from hyuav.learning.weights import (
     copy_weights,
@@ -50,9 +51,13 @@ class Earned(NamedTuple):
     """What actors earn without noise, on average over the same episodes."""
 
     reward: Tensor
-    """(N,) bps/Hz, accumulated, with penalties."""
+    """(N,) bps/Hz, accumulated, with penalties; less the luck of these episodes, where the learner
+    has a control variate, so that flights are told apart that differ by less."""
     sum_rate: Tensor
     """(N,) bps/Hz, the accumulated secrecy sum-rate alone."""
+    way: Tensor
+    """(T, N, 2), where the actors flew in the first of the episodes, in units of half the map's
+    side."""
 
 
 class Cohort:
@@ -86,13 +91,10 @@ class Cohort:
         with self.env.device:
             self.algorithm = algorithm.assemble(len(seeds), scenario)
         draw_weights(self.algorithm.loss, seeds, "weights")
-        if self.algorithm.control_variate is not None:
-            draw_weights(self.algorithm.control_variate, seeds, "control variate")
-        imagined = algorithm.imagined_flights
-        self._imagination = (
-            Imagination(imagined, self.env.base_env.system, schemes) if imagined else None
-        )
+        if self.algorithm.expectation is not None:
+            draw_weights(self.algorithm.expectation, seeds, "control variate")
         self._streams = self._random_streams(seeds)
+        self._search = self._flight_search(schemes)
         self.replay = make_replay(
             replay_size,
             batch_size,
@@ -117,16 +119,29 @@ class Cohort:
 
     def _random_streams(self, seeds: Sequence[int]) -> dict[str, RowStream]:
         size, normals = self.batch_size, sum(step.normals for step in self.algorithm.steps)
+        features = 0 if self.algorithm.expectation is None else self.algorithm.expectation.size
+        imagined = self.algorithm.parameters.imagined_flights * (features > 0)
         laws = {
             "exploration": (standard_normal, (self.algorithm.parameters.explorer_normals, 2)),
             "sampling": (uniform, (size,)),
             "losses": (standard_normal, (normals, size, 2)),
+            "guesses": (standard_normal, (features,)),
+            "variations": (standard_normal, (imagined, Imagination.NORMALS)),
         }
         return {
             name: RowStream(law, shape, seeds, name, self.env.device)
             for name, (law, shape) in laws.items()
             if math.prod(shape)
         }
+
+    def _flight_search(self, schemes: Sequence[str]) -> FlightSearch | None:
+        flights, expectation = self.algorithm.best_flights, self.algorithm.expectation
+        if flights is None or expectation is None:
+            return None
+        imagined = self.algorithm.parameters.imagined_flights
+        system = self.env.base_env.system
+        imagination = Imagination(imagined, system, schemes) if imagined else None
+        return FlightSearch(flights, expectation, imagination, self._streams)
 
     def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
         with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
@@ -139,7 +154,7 @@ class Cohort:
         """Actions (T, N, 2) that are taken whatever the explorer says, NaN where there are none."""
         flights = self.algorithm.best_flights
         assert flights is not None
-        planned = flights.actions
+        planned = flights.tried_actions
         return planned if self.algorithm.repeats(self.episode) else planned * torch.nan
 
     @property
@@ -179,25 +194,27 @@ class Cohort:
         self.episode += 1
         self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
-        if self.algorithm.best_flights is not None:
-            self._keep_flight(self.algorithm.best_flights)
+        self._keep_flight()
         self._stop_where_not_finite(*flown)
         return flown
 
-    def _keep_flight(self, flights: BestFlights) -> None:
+    def _keep_flight(self) -> None:
         """Keep the episode's flight where it is the best so far, or one that is better still.
 
         It counts what it earned; or where it is known, what is to be expected of it.
         """
-        flown = self.replay.storage._storage[latest(self.replay, self.scenario.num_slots)]
-        way, variate = flown["next", "observation"][..., :2], self.algorithm.control_variate
-        if variate is None:
-            flights.keep(flown["action"], way, flown["next", "reward"].sum(dim=(0, 2)))
+        flights = self.algorithm.best_flights
+        if flights is None:
             return
-        flights.reward.copy_(variate.expected(flights.way).nan_to_num(-torch.inf))
-        flights.keep(flown["action"], way, variate.expected(way))
-        if self._imagination and self.episode >= self.algorithm.parameters.warm_up_episodes:
-            self._imagination.improve(flights, variate, self.episode)
+        storage = self.replay.storage._storage
+        flown = storage[latest(self.replay, self.scenario.num_slots)]
+        if self._search is not None:
+            imagines = self.episode >= self.algorithm.parameters.warm_up_episodes
+            self._search.go_on(flown, storage[: len(self.replay)], self.episode, imagines=imagines)
+            return
+        way = flown["next", "observation"][..., :2]
+        flights.keep(flown["action"], way, flown["next", "reward"].sum(dim=(0, 2)))
+        flights.try_best()
 
     def _stop_where_not_finite(self, reward: Tensor, losses: dict[str, Tensor]) -> None:
         finite = finite_learners(self.algorithm.loss) & reward.isfinite()
@@ -261,31 +278,45 @@ class Cohort:
             seed: of the fading.
             scheme: that all learners fly; None for each learner's own.
         """
+        expectation = self.algorithm.expectation
         env = make_env(
             self.scenario,
             self.env.base_env.schemes if scheme is None else scheme,
             (len(self.learners), episodes),
             self.env.device,
             [derived_seed(seed, "evaluation")] * len(self.learners),
+            fading=expectation is not None,
             **self._options,
         )
-        state, off_map = env.reset(), torch.zeros(len(self.learners), device=env.device)
+        off_map, luck = torch.zeros(2, len(self.learners), device=env.device)
+        state, way = env.reset(), []
         for _ in range(self.scenario.num_slots):
-            state = env.step_mdp(env.step(self.algorithm.actor(state)))
+            slot = env.step(self.algorithm.actor(state))
+            if expectation is not None:
+                luck += expectation.variate.luck(slot).mean(dim=(1, 2))
+            state = env.step_mdp(slot)
             off_map += state["off_map"].squeeze(-1).float().mean(dim=-1)
+            way.append(state["observation"][:, 0, :2])
         reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
-        return Earned(reward, reward + self.scenario.off_map_penalty * off_map)
+        sum_rate = reward + self.scenario.off_map_penalty * off_map
+        fair = reward - luck / self.algorithm.parameters.reward_scale
+        return Earned(fair, sum_rate, torch.stack(way))
 
-    def keep_best(self, evaluation: Tensor) -> None:
-        """Where a learner was never better than ``evaluation`` (N,), its weights are the best.
+    def keep_best(self, earned: Earned) -> None:
+        """Where a learner never earned more than ``earned``, its weights are the best.
 
-        Where it was, and the algorithm restarts, its actor goes on from the best.
+        Where it did, and the algorithm restarts, its actor goes on from the best; but not one that
+        is on its way to a better flight.
         """
-        better = (evaluation > self.best_evaluation) & (self.stopped == 0)
-        self.best_evaluation = torch.where(better, evaluation, self.best_evaluation)
+        flights = self.algorithm.best_flights
+        better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
+        self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
         replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
+        if flights is not None:
+            flights.own_way.copy_(earned.way)
         if self.algorithm.restarts(self.episode):
-            restore_actors(self.algorithm.loss, self.best_weights, ~better)
+            stays = better if flights is None else better | flights.behind
+            restore_actors(self.algorithm.loss, self.best_weights, ~stays)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that evolves; the tensors are the cohort's own."""

@@ -56,18 +56,6 @@ class ControlVariate(nn.Module):
         return self(following[..., :2], following[..., -1:])
 
     @torch.no_grad()
-    def expected(self, way: Tensor) -> Tensor:
-        """What is to be expected of flights, by all that was earned so far: (N, ...).
-
-        Args:
-            way: (T, N, ..., 2), where they lead, in units of half the map's side.
-        """
-        slots = torch.arange(1, len(way) + 1, device=way.device).to(way.dtype)
-        clock = (slots * (2.0 / len(way)) - 1.0).reshape(-1, *[1] * (way.ndim - 1))
-        clock = clock.expand(*way.shape[:-1], 1)
-        return self(way.transpose(0, 1), clock.transpose(0, 1))[0].squeeze(-1).sum(dim=1)
-
-    @torch.no_grad()
     def luck(self, batch: TensorDictBase) -> Tensor:
         """What the fading added to the rewards of a mini-batch (N, K): (N, K, 1)."""
         _, weights = self._of(batch)

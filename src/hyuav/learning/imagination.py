@@ -1,4 +1,4 @@
-"""Flights that were never flown, and what is to be expected of them."""
+"""Flights that were never flown, to be judged by what was learned of places."""
 
 from collections.abc import Sequence
 
@@ -6,25 +6,31 @@ import torch
 from torch import Tensor
 
 from hyuav.envs.transforms import WITHIN
-from hyuav.learning.control_variate import ControlVariate
 from hyuav.learning.exploration import EVENLY, destinations
 from hyuav.learning.repetition import BestFlights
 from hyuav.system import SecureOffloadingSystem
 
+FINEST = 40.0
+"""A variation's smallest typical displacement is this part of what is flown in a slot."""
+
 
 class Imagination:
-    """Flights to places all over the map, the best of which are worth trying.
+    """Flights to places all over the map, and variations of good ones.
 
-    How the helper flies is known, and what a place earns is what a learner's regression holds
-    after all that it has seen; so flights can be judged before they are flown, as in Dyna (Sutton,
-    "Integrated architectures for learning, planning, and reacting", ICML 1990). What was judged
-    too well is found out by flying it. From episode to episode the places fill the map evenly.
+    How the helper flies is known, and what a place earns is what a learner holds after all that it
+    has seen; so flights can be judged before they are flown, as in Dyna (Sutton, "Integrated
+    architectures for learning, planning, and reacting", ICML 1990). What was judged too well is
+    found out by flying it. From episode to episode the places fill the map evenly; a variation
+    displaces some slots in a row of a flight, by metres or by as far as can be flown in a slot.
 
     Args:
-        flights: D, of which the best is looked for at once.
+        flights: D, straight ones, and as many variations.
         system: that is flown.
         schemes: of the N learners.
     """
+
+    NORMALS = 5
+    """Standard normal numbers that make a variation."""
 
     def __init__(
         self, flights: int, system: SecureOffloadingSystem, schemes: Sequence[str]
@@ -34,38 +40,51 @@ class Imagination:
         limit = system.norm_limit(schemes)
         self._norm_limit = None if limit is None else limit.unsqueeze(1)
         self._learners = len(schemes)
+        scenario = system.scenario
+        self._half_side = scenario.map_side / 2
+        self._reach = scenario.max_speed * scenario.slot_duration / self._half_side
 
-    def improve(self, best: BestFlights, variate: ControlVariate, episode: int) -> None:
-        """Let an imagined flight be the best where more is to be expected of it.
+    def fly(self, episode: int, flights: BestFlights, normals: Tensor) -> tuple[Tensor, Tensor]:
+        """The flights of an episode; the first variation is the best flight itself.
 
         Args:
-            best: of each learner.
-            variate: which has learned what to expect.
-            episode: in which others are imagined than in those before.
-        """
-        actions, way = self.fly(episode)
-        expected, chosen = variate.expected(way).max(dim=1)
-        index = chosen[None, :, None, None].expand(len(way), -1, 1, 2)
-        taken = torch.take_along_dim(actions, index, dim=2).squeeze(2)
-        best.keep(taken, torch.take_along_dim(way, index, dim=2).squeeze(2), expected)
-
-    def fly(self, episode: int) -> tuple[Tensor, Tensor]:
-        """The flights of an episode.
+            episode: in which straight flights lead to other places than in those before.
+            flights: which are varied, the best and the one that was tried last.
+            normals: (N, D, 5), standard normal.
 
         Returns:
-            the actions (T, N, D, 2), and where they lead, in units of half the map's side.
+            the actions (T, N, 2 D, 2), and where they lead, in units of half the map's side.
         """
-        scenario = self._system.scenario
-        half_side = scenario.map_side / 2
-        reach = scenario.max_speed * scenario.slot_duration
+        towards = torch.cat([self._straight(episode), self._variations(flights, normals)], dim=2)
+        position = self._system.helper_start.expand(*towards.shape[1:])
+        actions, way = [], []
+        for target in towards:
+            action = ((target - position / self._half_side) / self._reach).clamp(-1.0, 1.0)
+            position = self._system.move(position, action, self._norm_limit).position
+            actions.append(action)
+            way.append(position / self._half_side)
+        return torch.stack(actions), torch.stack(way)
+
+    def _straight(self, episode: int) -> Tensor:
+        """Where to fly in each slot: (T, N, D, 2)."""
         places = self._places + len(self._places) * episode
         share = torch.stack([torch.frac(places * multiple) for multiple in EVENLY], dim=-1)
-        destination = destinations(share.to(self._system.dtype)) * (half_side * WITHIN)
-        position = self._system.helper_start.expand(self._learners, len(places), 2)
-        actions, way = [], []
-        for _ in range(scenario.num_slots):
-            action = ((destination - position) / reach).clamp(-1.0, 1.0)
-            position = self._system.move(position, action, self._norm_limit).position
-            actions.append(action.expand(position.shape))
-            way.append(position / half_side)
-        return torch.stack(actions), torch.stack(way)
+        ends = destinations(share.to(self._system.dtype)) * WITHIN
+        return ends.expand(self._system.scenario.num_slots, self._learners, *ends.shape)
+
+    def _variations(self, flights: BestFlights, normals: Tensor) -> Tensor:
+        """The same of variations."""
+        varied = len(self._places)
+        half = varied - varied // 2
+        of_best = flights.way.unsqueeze(2).expand(-1, -1, half, -1)
+        of_tried = flights.tried_way.unsqueeze(2).expand(-1, -1, varied // 2, -1)
+        begin, length, fineness = torch.special.ndtr(normals[..., :3]).unbind(dim=-1)
+        num_slots = len(flights.way)
+        slots = torch.arange(num_slots, device=normals.device).reshape(-1, 1, 1)
+        first = (num_slots * (2.0 * begin - 1.0)).floor()  # below 0: from the beginning on
+        displaced = (slots >= first) & (slots <= first.clamp(min=0.0) + num_slots * length)
+        size = self._reach * FINEST**-fineness
+        size[:, 0] = 0.0
+        displacement = displaced.unsqueeze(-1) * (size.unsqueeze(-1) * normals[..., 3:])
+        way = torch.cat([of_best, of_tried], dim=2) + displacement
+        return way.nan_to_num(0.0).clamp(-WITHIN, WITHIN)

@@ -9,6 +9,7 @@ import torch
 from hyuav.errors import InputError, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.control_variate import HIDDEN_SIZES
+from hyuav.learning.expectation import MANY_UES, POLYNOMIAL
 
 COPIES = 16
 """Of the weights of the largest network: networks, targets, moments, gradients and best weights."""
@@ -38,17 +39,20 @@ def require_memory(
     """
     learners, observed = len(horizons), num_ues + 6
     faded = (3 * num_ues + 2) * algorithm.control_variate
-    imagined = algorithm.imagined_flights * algorithm.control_variate
+    imagined = 2 * algorithm.imagined_flights * algorithm.control_variate
+    regressed = HIDDEN_SIZES[-1] + 1 + POLYNOMIAL * num_ues * (num_ues <= MANY_UES)
     inputs = 2 * observed if algorithm.afterstate else observed + 2
     layers = (inputs, *algorithm.hidden_sizes, 2)
     widths = sum(layers)
     needed = {
         "hidden_sizes": learners * COPIES * sum((low + 1) * high for low, high in pairwise(layers)),
-        "replay_size": learners * sizes["replay_size"] * (2 * observed + 6 + faded),
+        "replay_size": learners
+        * sizes["replay_size"]
+        * (2 * observed + 6 + faded + 3 * regressed * algorithm.control_variate),
         "batch_size": learners * sizes["batch_size"] * 2 * widths,
         "evaluation_episodes": learners * sizes["evaluation_episodes"] * 4 * observed,
         "num_slots": 4 * sum(horizons),
-        "imagined_flights": sum(horizons) * imagined * 2 * (2 * observed + HIDDEN_SIZES[0]),
+        "imagined_flights": sum(horizons) * imagined * 3 * regressed,
     }
     available = device_memory(device)
     if _FLOAT * sum(needed.values()) > available:

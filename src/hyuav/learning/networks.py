@@ -84,10 +84,19 @@ class LearnerMLP(nn.Module):
 
     def before_output(self, *inputs: Tensor) -> Tensor:
         """The same up to the last layer's result, before ``output`` is applied to it."""
-        joined = inputs[0] if len(inputs) == 1 else torch.cat(inputs, dim=-1)
-        learners, features = joined.shape[0], joined.shape[-1]
-        outputs: Tensor = self.layers(joined.reshape(learners, -1, features))
-        return outputs.reshape(*joined.shape[:-1], outputs.shape[-1])
+        return _over_rows(self.layers, *inputs)
+
+    def hidden(self, *inputs: Tensor) -> Tensor:
+        """The same up to the last hidden layer's result."""
+        return _over_rows(self.layers[:-1], *inputs)
+
+
+def _over_rows(layers: nn.Module, *inputs: Tensor) -> Tensor:
+    """Apply layers to inputs (N, ..., k), whatever lies between the learners and the features."""
+    joined = inputs[0] if len(inputs) == 1 else torch.cat(inputs, dim=-1)
+    learners, features = joined.shape[0], joined.shape[-1]
+    outputs: Tensor = layers(joined.reshape(learners, -1, features))
+    return outputs.reshape(*joined.shape[:-1], outputs.shape[-1])
 
 
 class StretchedTanh(nn.Module):
@@ -109,9 +118,13 @@ class StretchedTanh(nn.Module):
 class AfterstateCritic(nn.Module):
     """Q(s, a) by what (s, a) leads to.
 
+    It is a sum, as the secrecy sum-rate is: of a part for each UE, which counts as far as the
+    helper covers it, and of one that always counts. So it need not learn how a UE's part ends at
+    the edge of its coverage.
+
     Args:
         afterstate: of the scenario.
-        network: maps its features to values.
+        network: maps its features to the 1 + U parts.
     """
 
     def __init__(self, afterstate: Afterstate, network: LearnerMLP) -> None:
@@ -120,7 +133,10 @@ class AfterstateCritic(nn.Module):
 
     def forward(self, observation: Tensor, action: Tensor) -> Tensor:
         """Map observations (N, ..., U + 5) and actions (N, ..., 2) to values (N, ..., 1)."""
-        values: Tensor = self.network(self.afterstate(observation, action))
+        features = self.afterstate(observation, action)
+        always, of_each_ue = self.network(features).tensor_split([1], dim=-1)
+        covered = self.afterstate.coverage(features)
+        values: Tensor = always + (covered * of_each_ue).sum(dim=-1, keepdim=True)
         return values
 
 
@@ -138,8 +154,11 @@ def make_critic(
     Reads ``observation`` (N, ..., U + 5) and ``action`` (N, ..., 2), writes
     ``state_action_value`` (N, ..., 1). With an afterstate, its features are what the networks see.
     """
-    inputs = observation_size + 2 if afterstate is None else afterstate.size
-    network = LearnerMLP(learners, inputs, hidden_sizes, 1, activation, layer_norm=layer_norm)
+    if afterstate is None:
+        inputs, outputs = observation_size + 2, 1
+    else:
+        inputs, outputs = afterstate.size, 1 + afterstate.num_ues
+    network = LearnerMLP(learners, inputs, hidden_sizes, outputs, activation, layer_norm=layer_norm)
     return TensorDictModule(
         network if afterstate is None else AfterstateCritic(afterstate, network),
         in_keys=["observation", "action"],

@@ -13,13 +13,17 @@ def as_planned(tensordict: TensorDictBase, planned: Tensor) -> TensorDictBase:
     return tensordict
 
 
+AHEAD = 0.005
+"""Share by which the best flight must be worth more than an actor's own to be joined everywhere."""
+
+
 class BestFlights(nn.Module):
     """The flight of each learner that earned most, or of which most is to be expected.
 
     The helper moves as it is told, so that the same actions lead it the same way, through other
     fading. A way that was found once by chance is thus seen often enough to be learned of before
     it is forgotten, and luck is told from merit (Ecoffet et al., "First return, then explore",
-    Nature 590, 2021).
+    Nature 590, 2021). Beside it stands the one to try next, which may be another.
 
     Args:
         learners: N.
@@ -32,6 +36,14 @@ class BestFlights(nn.Module):
     """(T, N, 2)."""
     way: Tensor
     """(T, N, 2), where each was after each slot, in units of half the map's side."""
+    tried_actions: Tensor
+    """(T, N, 2), of the one to try."""
+    tried_way: Tensor
+    """(T, N, 2), where that leads."""
+    own_way: Tensor
+    """(T, N, 2), where the actors flew when they were last evaluated."""
+    behind: Tensor
+    """(N,) bool, of which learners the actor's own flight is worth clearly less than the best."""
 
     def __init__(self, learners: int, scenario: Scenario) -> None:
         super().__init__()
@@ -39,8 +51,9 @@ class BestFlights(nn.Module):
         self._slots_per_unit = scenario.num_slots / 2
         self._reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
         self.register_buffer("reward", torch.full((learners,), -torch.inf))
-        self.register_buffer("actions", torch.full(shape, torch.nan))
-        self.register_buffer("way", torch.full(shape, torch.nan))
+        for name in ("actions", "way", "tried_actions", "tried_way", "own_way"):
+            self.register_buffer(name, torch.full(shape, torch.nan))
+        self.register_buffer("behind", torch.zeros(learners, dtype=torch.bool))
 
     def keep(self, actions: Tensor, way: Tensor, reward: Tensor) -> None:
         """Keep a flight where it is better than the best before.
@@ -54,6 +67,23 @@ class BestFlights(nn.Module):
         self.reward.copy_(torch.where(better, reward, self.reward))
         for kept, new in ((self.actions, actions), (self.way, way)):
             kept.copy_(torch.where(better.unsqueeze(-1), new, kept))
+
+    def try_best(self) -> None:
+        """Let the flight to try be the best one."""
+        self.try_next(self.actions, self.way)
+
+    def try_next(self, actions: Tensor, way: Tensor) -> None:
+        """Let these actions, which lead this way, be the flight to try: (T, N, 2) each."""
+        self.tried_actions.copy_(actions)
+        self.tried_way.copy_(way)
+
+    def compare(self, own: Tensor) -> None:
+        """Find out who is behind.
+
+        Args:
+            own: (N,), what the actors' own flights are worth, NaN where that is not known.
+        """
+        self.behind.copy_(self.reward > own + AHEAD * own.abs())
 
     def towards(self, observation: Tensor) -> Tensor:
         """Actions (N, K, 2) that join the best flights by the next slot, or as soon as possible.

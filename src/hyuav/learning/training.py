@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -62,6 +62,15 @@ class TrainingParameters(Parameters):
         return {name: getattr(self, name) for name in names}
 
 
+class Evaluation(NamedTuple):
+    """What all actors earn without noise; see :class:`hyuav.learning.cohort.Earned`."""
+
+    reward: Tensor
+    """(N,) bps/Hz."""
+    sum_rate: Tensor
+    """(N,) bps/Hz."""
+
+
 @dataclass(frozen=True)
 class Episode:
     """What one episode of training brought to each of the N learners."""
@@ -74,7 +83,7 @@ class Episode:
     """(N,) bps/Hz, with exploration and penalties, undiscounted."""
     losses: dict[str, Tensor]
     """(N,) mean loss of the episode's updates, by gradient step; NaN where there was none."""
-    evaluation: Earned | None
+    evaluation: Evaluation | None
     """Without noise, in the episodes that end with an evaluation."""
     learning: tuple[bool, ...]
     """Whether each learner's numbers count: those of one that has stopped do not."""
@@ -249,7 +258,7 @@ class Training:
         last = self.episode == self.parameters.num_episodes
         return last or self.episode % self.parameters.evaluation_every == 0
 
-    def evaluate(self, scheme: str | None = None) -> Earned:
+    def evaluate(self, scheme: str | None = None) -> Evaluation:
         """Fly the current actors without noise, all through the same fading every time.
 
         Args:
@@ -261,15 +270,17 @@ class Training:
         episodes, seed = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
         return [cohort.evaluate(episodes, seed, scheme) for cohort in self.cohorts]
 
-    def _together(self, evaluations: Sequence[Earned]) -> Earned:
-        rewards, sum_rates = zip(*evaluations, strict=True)
-        return Earned(self._in_order(rewards), self._in_order(sum_rates))
+    def _together(self, earned: Sequence[Earned]) -> Evaluation:
+        return Evaluation(
+            self._in_order([own.reward for own in earned]),
+            self._in_order([own.sum_rate for own in earned]),
+        )
 
-    def _keep_best(self) -> Earned:
+    def _keep_best(self) -> Evaluation:
         """Evaluate; where a learner has never been better, its weights are the best so far."""
         evaluations = self._evaluate(None)
         for cohort, evaluation in zip(self.cohorts, evaluations, strict=True):
-            cohort.keep_best(evaluation.reward)
+            cohort.keep_best(evaluation)
         return self._together(evaluations)
 
     def load_weights(self, weights: dict[str, Tensor]) -> None:

@@ -206,3 +206,25 @@ def test_weighing_alternatives_leaves_the_targets_without_gradients(kind: type[D
         algorithm.update_targets(index)
     for name, values in algorithm.loss.named_buffers():
         assert not values.requires_grad, name
+
+
+@pytest.mark.parametrize("kind", [DDPG, TD3])
+def test_an_actor_that_is_behind_joins_the_best_flight_whatever_its_critics_hold(
+    kind: type[DDPG],
+) -> None:
+    torch.manual_seed(0)
+    algorithm = kind(clock=True, hidden_sizes=(8,), alternatives_weight=1.0).build(2, TEN_UES)
+    flights = algorithm.best_flights
+    assert flights is not None
+    flights.way.fill_(0.3)
+    batch = mini_batch(2, 5, observation_size=16)
+    action = algorithm.actor(batch.clone())["action"]
+    parameters = algorithm.parameters
+    assert isinstance(parameters, DDPG)
+    before = parameters.missed(algorithm.loss, flights, batch["observation"], action)
+    flights.behind[1] = True
+    missed = parameters.missed(algorithm.loss, flights, batch["observation"], action)
+    away = (action - flights.towards(batch["observation"])).square().sum(dim=-1)
+    torch.testing.assert_close(missed[1], away[1])
+    torch.testing.assert_close(missed[0], before[0])
+    assert not torch.allclose(missed[1], before[1])

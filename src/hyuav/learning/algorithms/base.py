@@ -18,6 +18,7 @@ from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 
 from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.control_variate import ControlVariate
+from hyuav.learning.expectation import Expectation
 from hyuav.learning.exploration import WarmUp
 from hyuav.learning.networks import ACTIVATIONS, make_critic
 from hyuav.learning.repetition import BestFlights
@@ -60,8 +61,8 @@ class AlgorithmParameters(Parameters, ABC):
     warm_up_episodes: int = parameter(count(0), 0)
     """Flown to places all over the map; see :class:`hyuav.learning.exploration.WarmUp`."""
     repeat_every: int = parameter(count(0), 0)
-    """After the warm-up, and until actors restart, every n-th episode takes the actions of the best
-    flight so far; 0 for never. See :class:`hyuav.learning.repetition.BestFlights`."""
+    """After the warm-up, every n-th episode takes the actions of the best flight so far, or of one
+    that may be better; 0 for never. See :class:`hyuav.learning.search.FlightSearch`."""
     restart_after: int = parameter(count(0), 0)
     """Episodes from which on an actor that is evaluated and found worse than it was goes on from
     its best weights; 0 for never."""
@@ -70,7 +71,7 @@ class AlgorithmParameters(Parameters, ABC):
     :class:`hyuav.learning.control_variate.ControlVariate`."""
     imagined_flights: int = parameter(count(0, 100_000), 0)
     """After each episode from the end of the warm-up on, where flights are kept and there is a
-    control variate: how many it judges, for one that is better than the best so far; see
+    control variate: how many straight flights are judged, and as many variations of the best; see
     :class:`hyuav.learning.imagination.Imagination`."""
 
     @abstractmethod
@@ -101,8 +102,9 @@ class AlgorithmParameters(Parameters, ABC):
             variate = ControlVariate(learners, scenario, self.reward_scale, clock=self.clock)
             optimizer = adam(variate, VARIATE_LEARNING_RATE)
             step = GradientStep("control variate", variate.loss, optimizer)
+            expectation = Expectation(learners, variate, self.reward_scale)
             steps = (step, *algorithm.steps)
-            algorithm = replace(algorithm, steps=steps, control_variate=variate)
+            algorithm = replace(algorithm, steps=steps, expectation=expectation)
         return algorithm
 
     def observation_size(self, scenario: Scenario) -> int:
@@ -192,8 +194,9 @@ class Algorithm:
     """The targets follow in every n-th update."""
     best_flights: BestFlights | None = None
     """Of each learner, where they are of use."""
-    control_variate: ControlVariate | None = None
-    """What takes the luck of the fading off the rewards of a mini-batch, if any."""
+    expectation: Expectation | None = None
+    """What flights are expected to earn, if it is learned, and with it the control variate, which
+    takes the luck of the fading off the rewards of a mini-batch."""
 
     def learning_rate_factor(self, episode: int) -> float:
         """Of the learning rates in an episode, from 1."""
@@ -210,10 +213,9 @@ class Algorithm:
         return 0 < self.parameters.restart_after <= episode
 
     def repeats(self, episode: int) -> bool:
-        """Whether an episode, from 1, takes the actions of the best flight so far."""
+        """Whether an episode, from 1, takes the actions of the flight that is to be tried."""
         every = self.parameters.repeat_every
-        explores = episode > self.parameters.warm_up_episodes and not self.restarts(episode)
-        return every > 0 and episode % every == 0 and explores
+        return every > 0 and episode % every == 0 and episode > self.parameters.warm_up_episodes
 
     def due(self, index: int) -> tuple[bool, ...]:
         """Which gradient steps the update of this index takes, and last whether targets follow."""
@@ -230,7 +232,7 @@ class Algorithm:
 
     def fair(self, batch: TensorDictBase) -> TensorDictBase:
         """A mini-batch (N, K) as the losses want to see it."""
-        return batch if self.control_variate is None else self.control_variate.fair(batch)
+        return batch if self.expectation is None else self.expectation.variate.fair(batch)
 
     def update_networks(self, batch: TensorDictBase, index: int) -> dict[str, Tensor]:
         """Take the gradient steps, eq. 9 and 10 for DDPG, on one mini-batch of each learner.
@@ -265,8 +267,8 @@ class Algorithm:
         modules = {"loss": self.loss, "explorer": self.explorer}
         if self.best_flights is not None:
             modules["best_flights"] = self.best_flights
-        if self.control_variate is not None:
-            modules["control_variate"] = self.control_variate
+        if self.expectation is not None:
+            modules["expectation"] = self.expectation
         return nn.ModuleDict(modules)
 
 

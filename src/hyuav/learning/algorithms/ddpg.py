@@ -181,6 +181,9 @@ class DDPG(AlgorithmParameters):
     ) -> Tensor:
         """Squared distance of the actor from the best alternative, 0 where none is clearly better.
 
+        An actor whose whole flight is behind the best one is to join that, whatever its critics
+        hold of a single action.
+
         Args:
             loss: with the critics.
             flights: the best so far.
@@ -195,8 +198,12 @@ class DDPG(AlgorithmParameters):
         worth, best = self.rate(loss, weights, observation, others).squeeze(-1).max(dim=1)
         own = self.rate(loss, weights, observation, action.detach()).squeeze(-1)
         chosen = torch.take_along_dim(others, best[:, None, :, None], dim=1).squeeze(1)
-        distance = (action - chosen).square().sum(dim=-1)
-        return (worth > own + CLEARLY) * distance
+        better = worth > own + CLEARLY
+        if self.clock:
+            behind = flights.behind.unsqueeze(-1)
+            chosen = torch.where(behind.unsqueeze(-1), others[:, 1], chosen)
+            better = better | behind
+        return better * (action - chosen).square().sum(dim=-1)
 
 
 def saturation(output: Tensor) -> Tensor:

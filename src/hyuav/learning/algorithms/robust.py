@@ -18,7 +18,7 @@ class Robust(AlgorithmParameters):
 
     actor_learning_rate: float = parameter(learning_rate, 3e-4)
     critic_learning_rate: float = parameter(learning_rate, 3e-4)
-    learning_rate_decay: float = parameter(number(0.0, 1.0), 0.997)
+    learning_rate_decay: float = parameter(number(0.0, 1.0), 0.999)
     discount: float = parameter(number(0.0, 1.0), 1.0, symbol="gamma")
     target_rate: float = parameter(number(0.0, 1.0), 0.01, symbol="tau")
     clock: bool = parameter(switch, True)
@@ -31,7 +31,7 @@ class Robust(AlgorithmParameters):
     repeat_every: int = parameter(count(0), 4)
     restart_after: int = parameter(count(0), 200)
     control_variate: bool = parameter(switch, True)
-    imagined_flights: int = parameter(count(0, 100_000), 128)
+    imagined_flights: int = parameter(count(0, 100_000), 64)
 
 
 @dataclass(frozen=True)
