@@ -160,18 +160,19 @@ def test_the_same_request_goes_on_and_another_is_refused(run: RunDirectory, unbr
 
 
 def test_a_learner_without_finite_numbers_stops_and_the_others_do_not_notice(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], unbroken: Path
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Its critic begins with weights so large that the square of its loss is beyond a float."""
     configuration = every_episode(6)
     weights = new_training(configuration).best_weights
+    healthy = train(tmp_path / "whole", configuration, OFF, SILENT, initial_weights=weights)
     for name, values in weights.items():
         if "value_network" in name:
             values.select(-min(values.ndim, 3), 1).mul_(1e25)
     run = train(tmp_path / "run", configuration, OFF, SILENT, initial_weights=weights)
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("learner 1 (relay_T8_seed3) stops in episode ")
-    metrics, whole = run.metrics(), RunDirectory(unbroken).metrics()
+    metrics, whole = run.metrics(), healthy.metrics()
     last = metrics.groupby("learner")["episode"].max().to_dict()
     assert last[0] == last[2] == 6
     assert f"stops in episode {last[1] + 1}, slots {8 * last[1] + 1} to {8 * last[1] + 8}" in line

@@ -35,7 +35,8 @@ def earned(place: Tensor) -> Tensor:
 
 def memory(places: Tensor, scale: float = 0.05) -> TensorDictBase:
     """Slots (n, N) without luck that ended at ``places`` (n, N, 2)."""
-    clock = torch.zeros_like(places[..., :1])
+    clock = torch.rand(len(places), 1, 1, generator=torch.Generator().manual_seed(3)) * 2.0 - 1.0
+    clock = clock.expand(*places.shape[:-1], 1)
     after = TensorDict(
         observation=torch.cat([places, clock], dim=-1),
         reward=scale * earned(places),
