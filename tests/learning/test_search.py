@@ -17,11 +17,9 @@ from hyuav.learning.expectation import Expectation
 from hyuav.learning.imagination import Imagination
 from hyuav.learning.repetition import AHEAD, BestFlights
 from hyuav.learning.search import FlightSearch
-from hyuav.randomness import RowStream, standard_normal
 from hyuav.system import SecureOffloadingSystem
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
-CPU = torch.device("cpu")
 
 
 class FarIsBetter(Expectation):
@@ -49,14 +47,10 @@ def flown(x: float, learners: int = 2) -> TensorDictBase:
 
 
 def search(imagined: int = 0) -> tuple[FlightSearch, BestFlights, FarIsBetter]:
-    seeds, flights, expectation = [1, 2], BestFlights(2, SCENARIO), FarIsBetter(2)
-    streams = {
-        "guesses": RowStream(standard_normal, (expectation.size,), seeds, "guesses", CPU),
-        "variations": RowStream(standard_normal, (max(imagined, 1), 5), seeds, "variations", CPU),
-    }
+    flights, expectation = BestFlights(2, SCENARIO), FarIsBetter(2)
     system = SecureOffloadingSystem(SCENARIO)
     imagination = Imagination(imagined, system, ["hybrid"] * 2) if imagined else None
-    return FlightSearch(flights, expectation, imagination, streams), flights, expectation
+    return FlightSearch(flights, expectation, imagination, [1, 2]), flights, expectation
 
 
 def test_the_flight_of_which_most_is_expected_is_kept_and_tried() -> None:

@@ -60,6 +60,8 @@ def tensors(trained: Cohort) -> dict[str, torch.Tensor]:
             found |= {f"{step.name}.{index}.{key}": values for key, values in state.items()}
     found |= {str(key): values for key, values in trained.replay[:].items(True, True)}
     carrier = trained.collector._carrier
+    for stream, state in trained.state_dict()["random"].items():
+        found[f"drawn from {stream}"] = torch.tensor(state["drawn"])
     found |= {f"carrier.{key}": carrier[key] for key in ("observation", "mode", "step_count")}
     return {
         name: values.clone().nan_to_num()  # NaN where no flight is planned

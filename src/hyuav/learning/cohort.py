@@ -94,7 +94,7 @@ class Cohort:
         if self.algorithm.expectation is not None:
             draw_weights(self.algorithm.expectation, seeds, "control variate")
         self._streams = self._random_streams(seeds)
-        self._search = self._flight_search(schemes)
+        self._search = self._flight_search(schemes, seeds)
         self.replay = make_replay(
             replay_size,
             batch_size,
@@ -119,14 +119,10 @@ class Cohort:
 
     def _random_streams(self, seeds: Sequence[int]) -> dict[str, RowStream]:
         size, normals = self.batch_size, sum(step.normals for step in self.algorithm.steps)
-        features = 0 if self.algorithm.expectation is None else self.algorithm.expectation.size
-        imagined = self.algorithm.parameters.imagined_flights * (features > 0)
         laws = {
             "exploration": (standard_normal, (self.algorithm.parameters.explorer_normals, 2)),
             "sampling": (uniform, (size,)),
             "losses": (standard_normal, (normals, size, 2)),
-            "guesses": (standard_normal, (features,)),
-            "variations": (standard_normal, (imagined, Imagination.NORMALS)),
         }
         return {
             name: RowStream(law, shape, seeds, name, self.env.device)
@@ -134,14 +130,19 @@ class Cohort:
             if math.prod(shape)
         }
 
-    def _flight_search(self, schemes: Sequence[str]) -> FlightSearch | None:
+    @property
+    def _all_streams(self) -> dict[str, RowStream]:
+        """Those that slots draw from, and those that the search draws from after an episode."""
+        return self._streams | (self._search.streams if self._search else {})
+
+    def _flight_search(self, schemes: Sequence[str], seeds: Sequence[int]) -> FlightSearch | None:
         flights, expectation = self.algorithm.best_flights, self.algorithm.expectation
         if flights is None or expectation is None:
             return None
         imagined = self.algorithm.parameters.imagined_flights
         system = self.env.base_env.system
         imagination = Imagination(imagined, system, schemes) if imagined else None
-        return FlightSearch(flights, expectation, imagination, self._streams)
+        return FlightSearch(flights, expectation, imagination, seeds)
 
     def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
         with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
@@ -327,7 +328,7 @@ class Cohort:
             "replay": self.replay.state_dict(),
             "slot": self.collector._carrier.to_dict(),  # where the flight stands
             "environment": self.env.base_env.draws.state(),
-            "random": {name: stream.state() for name, stream in self._streams.items()},
+            "random": {name: stream.state() for name, stream in self._all_streams.items()},
             "episode": self.episode,
             "updates": self.updates,
             "best_evaluation": self.best_evaluation,
@@ -344,7 +345,7 @@ class Cohort:
         self.replay.load_state_dict(state["replay"])
         self.collector._carrier.update(state["slot"])
         self.env.base_env.draws.set_state(state["environment"])
-        for name, stream in self._streams.items():
+        for name, stream in self._all_streams.items():
             stream.set_state(state["random"][name])
         self.episode, self.updates = state["episode"], state["updates"]
         self.best_evaluation = state["best_evaluation"].to(self.env.device)

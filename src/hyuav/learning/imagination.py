@@ -29,9 +29,6 @@ class Imagination:
         schemes: of the N learners.
     """
 
-    NORMALS = 5
-    """Standard normal numbers that make a variation."""
-
     def __init__(
         self, flights: int, system: SecureOffloadingSystem, schemes: Sequence[str]
     ) -> None:
@@ -40,6 +37,8 @@ class Imagination:
         limit = system.norm_limit(schemes)
         self._norm_limit = None if limit is None else limit.unsqueeze(1)
         self._learners = len(schemes)
+        self.normals = (flights, 5)
+        """Shape of the standard normal numbers that make the variations of one learner."""
         scenario = system.scenario
         self._half_side = scenario.map_side / 2
         self._reach = scenario.max_speed * scenario.slot_duration / self._half_side

@@ -1,6 +1,6 @@
 """Which flight of each learner is its best, and which it tries next."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import torch
 from tensordict import TensorDictBase
@@ -9,7 +9,7 @@ from torch import Tensor
 from hyuav.learning.expectation import Expectation
 from hyuav.learning.imagination import Imagination
 from hyuav.learning.repetition import BestFlights
-from hyuav.randomness import RowStream
+from hyuav.randomness import RowStream, standard_normal
 
 JUDGED_EVERY = 4
 """Episodes after which a learner goes through all that it remembers."""
@@ -22,18 +22,29 @@ class FlightSearch:
         flights: of the N learners, which are kept here.
         expectation: of the same learners.
         imagination: where flights are imagined.
-        streams: of random numbers, ``guesses`` (N, F) and ``variations`` (N, D, 5).
+        seeds: of the N learners' random numbers.
     """
+
+    streams: dict[str, RowStream]
+    """Of random numbers: ``guesses`` (N, F) and ``variations`` (N, D, 5)."""
 
     def __init__(
         self,
         flights: BestFlights,
         expectation: Expectation,
         imagination: Imagination | None,
-        streams: Mapping[str, RowStream],
+        seeds: Sequence[int],
     ) -> None:
         self._flights, self._expectation = flights, expectation
-        self._imagination, self._streams = imagination, streams
+        self._imagination = imagination
+        shapes: dict[str, tuple[int, ...]] = {"guesses": (expectation.size,)}
+        if imagination is not None:
+            shapes["variations"] = imagination.normals
+        device = flights.reward.device
+        self.streams = {
+            name: RowStream(standard_normal, shape, seeds, name, device)
+            for name, shape in shapes.items()
+        }
 
     def go_on(
         self, flown: TensorDictBase, memory: TensorDictBase, episode: int, *, imagines: bool
@@ -49,12 +60,12 @@ class FlightSearch:
         flights, expectation = self._flights, self._expectation
         judges = (episode + 1) % JUDGED_EVERY == 0
         if judges:
-            expectation.update(memory, next(self._streams["guesses"]))
+            expectation.update(memory, next(self.streams["guesses"]))
         way = flown["next", "observation"][..., :2]
         flights.reward.copy_(expectation.of(flights.way)[0].nan_to_num(-torch.inf))
         flights.keep(flown["action"], way, expectation.of(way)[0])
         if imagines and self._imagination is not None:
-            normals = next(self._streams["variations"])
+            normals = next(self.streams["variations"])
             imagined = self._imagination.fly(episode, flights, normals)
             expected, guessed = expectation.of(imagined[1])
             flights.keep(*_highest(imagined, expected), expected.amax(dim=1))
