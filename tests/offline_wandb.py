@@ -13,7 +13,7 @@ BLOCK, HEADER = 32768, struct.Struct("<IHB")
 FULL, FIRST, MIDDLE, LAST = 1, 2, 3, 4
 
 
-def _records(content: bytes) -> Iterator[bytes]:
+def records_of(content: bytes) -> Iterator[bytes]:
     position, parts = 7, b""  # the file's own header comes first
     while position + HEADER.size <= len(content):
         left_in_block = BLOCK - position % BLOCK
@@ -22,6 +22,8 @@ def _records(content: bytes) -> Iterator[bytes]:
             continue
         _, length, kind = HEADER.unpack_from(content, position)
         start = position + HEADER.size
+        if start + length > len(content):
+            return  # the rest of this one is still being written
         piece = content[start : start + length]
         position = start + length
         parts = piece if kind in (FULL, FIRST) else parts + piece
@@ -46,7 +48,7 @@ def offline_runs(directory: Path) -> list[Path]:
 def recorded(file: Path, kind: str) -> list[Any]:
     """All records of one kind in a run's file: "run", "metric", "artifact", "exit" and others."""
     found = []
-    for data in _records(file.read_bytes()):
+    for data in records_of(file.read_bytes()):
         record = wandb_internal_pb2.Record()  # type: ignore[attr-defined]
         record.ParseFromString(data)
         if record.WhichOneof("record_type") == kind:

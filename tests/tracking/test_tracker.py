@@ -22,7 +22,14 @@ from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.tracking import LoggerParameters, Tracker, learner_names
 from hyuav.tracking.checkpoints import restore
 from hyuav.tracking.session import remembered
-from offline_wandb import history, logged_history, offline_runs, recorded, summary
+from offline_wandb import (
+    history,
+    logged_history,
+    offline_runs,
+    recorded,
+    records_of,
+    summary,
+)
 
 CONFIGURATION = RunConfiguration(
     "two_clusters",
@@ -81,6 +88,17 @@ def test_checkpoints_are_written(tmp_path: Path) -> None:
     assert [cohort["episode"] for cohort in state["cohorts"]] == [5] * len(training.cohorts)
     best = run.best_weights()
     assert all(torch.equal(best[name], training.best_weights[name]) for name in best)
+
+
+def test_a_run_that_is_still_being_written_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    track(tmp_path, "offline")
+    (file,) = offline_runs(tmp_path)
+    content = file.read_bytes()
+    whole = list(records_of(content))
+    for length in range(0, len(content), 37):
+        part = list(records_of(content[:length]))
+        assert part == whole[: len(part)]
+        assert len(part) < len(whole)
 
 
 def test_the_same_metrics_reach_weights_and_biases_offline(tmp_path: Path) -> None:
