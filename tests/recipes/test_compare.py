@@ -182,6 +182,10 @@ REFUSALS = [
     (["algorithm=[ddpg,dpg]"], "algorithm[1] = 'dpg': expected one of ddpg, td3, sac"),
     (["algorithm=[sac,sac]"], "algorithm = ['sac', 'sac']: expected values that differ"),
     (["without=tau"], "without = 'tau': expected one of actor_learning_rate, "),
+    (
+        ["algorithm=[ddpg_robust,td3_robust]", "without=[clock]"],
+        "without = ['clock']: expected one variant at a time, not ddpg_robust, td3_robust",
+    ),
     (["without=[clock,clock]"], "without = ['clock', 'clock']: expected values that differ"),
     (["scenario=square"], "scenario = 'square': expected one of random_disk, two_clusters"),
     (["scenario=[]"], "scenario = []: expected at least one preset, or layouts >= 1"),

@@ -106,6 +106,10 @@ class Compare(Parameters):
             values = getattr(self, name)
             if len(set(values)) < len(values):
                 raise InputError(rejection(name, list(values), "values that differ"))
+        varied = {entry.partition("-")[0] for entry in self.entries if "-" in entry}
+        if len(varied) > 1:  # "without clock" would be a row of each
+            accepted = f"one variant at a time, not {', '.join(sorted(varied))}"
+            raise InputError(rejection("without", list(self.without), accepted))
         if not self.scenario and not self.layouts:
             accepted = "at least one preset, or layouts >= 1"
             raise InputError(rejection("scenario", [], accepted))
