@@ -9,18 +9,22 @@ from matplotlib.figure import Figure
 from hyuav.comparison.charts import (
     COLORS,
     cell_means,
+    color,
     curves_figure,
+    dash,
     improvement_bars,
     profiles_figure,
 )
-from hyuav.comparison.plan import ENTRIES
+from hyuav.comparison.plan import ENTRIES, PIECES
 from hyuav.comparison.statistics import (
     improvements,
     learning_curves,
     performance_profiles,
     summarize_cells,
 )
-from hyuav.comparison.tables import label
+from hyuav.comparison.tables import MOST_COLUMNS, label
+
+ABLATION = (*ENTRIES, *(f"ddpg_robust-{piece}" for piece in PIECES))
 
 
 def learners(algorithms: tuple[str, ...]) -> pd.DataFrame:
@@ -75,6 +79,41 @@ def test_no_two_algorithms_have_the_same_color() -> None:
     assert len(set(COLORS.values())) == len(ENTRIES)
 
 
+def test_no_two_entries_of_an_ablation_look_alike() -> None:
+    looks = {(color(entry), dash(entry)) for entry in ABLATION}
+    assert len(looks) == len(ABLATION)
+
+
+@pytest.mark.parametrize("algorithms", [("td3",), ENTRIES, ABLATION], ids=["one", "all", "pieces"])
+def test_nothing_leaves_the_picture_nor_covers_the_curves(algorithms: tuple[str, ...]) -> None:
+    rows = learners(algorithms)
+    last = rows[rows["episode"] == 20]
+    for figure in (
+        cell_means(summarize_cells(last, 0.97)),
+        curves_figure(learning_curves(rows), 0.97),
+        profiles_figure(performance_profiles(last, np.linspace(0.8, 1.0, 5)), 0.97),
+        *([improvement_bars(improvements(last))] if len(algorithms) > 1 else []),
+    ):
+        figure.draw_without_rendering()
+        drawn, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+        assert drawn.x0 >= 0.0
+        assert drawn.y0 >= 0.0
+        assert drawn.x1 <= width
+        assert drawn.y1 <= height
+        visible = [axes for axes in figure.axes if axes.get_visible()]
+        assert min(axes.get_window_extent().width for axes in visible) > 1.4 * figure.dpi
+        for legend_below in figure.legends:
+            box = legend_below.get_window_extent()
+            assert not any(box.overlaps(axes.get_window_extent()) for axes in visible)
+
+
 def test_each_pair_is_shown_once() -> None:
+    few = ENTRIES[:MOST_COLUMNS]
+    figure = improvement_bars(improvements(learners(few)))
+    assert len(figure.axes[0].get_yticks()) == len(few) * (len(few) - 1) / 2
+
+
+def test_of_many_only_the_first_is_set_beside_the_others() -> None:
     figure = improvement_bars(improvements(learners(ENTRIES)))
-    assert len(figure.axes[0].get_yticks()) == len(ENTRIES) * (len(ENTRIES) - 1) / 2
+    named = [text.get_text() for text in figure.axes[0].get_yticklabels()]
+    assert named == [label(entry) for entry in ENTRIES[1:]]

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -15,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from hyuav.comparison.directory import Summary
 from hyuav.comparison.plan import ENTRIES, PEER, PIECES, Compare
 from hyuav.comparison.statistics import learning_curves, performance_profiles
-from hyuav.comparison.tables import label
+from hyuav.comparison.tables import MOST_COLUMNS, label
 from hyuav.envs.rendering import OKABE_ITO
 from hyuav.figures import COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
 
@@ -27,13 +28,26 @@ COLORS = {name: OKABE_ITO[_OTHERS[i % len(_OTHERS)]] for i, name in enumerate(EN
 """The same color for an algorithm in every figure."""
 
 
+_DASHES: Sequence[Any] = (
+    "solid",
+    *((0, lengths) for lengths in ((4, 1.5), (1, 1.2), (6, 1.2, 1, 1.2), (9, 2))),
+)
+
+_MARKERS = "os^Dv"
+
+FRACTION = "Fraction of the optimum"
+
+
 def color(entry: str) -> str:
     """An entry's color; a variant without a piece has that of the piece."""
     piece = entry.partition("-")[2]
     return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]] if piece else COLORS[entry]
 
 
-FRACTION = "Fraction of the optimum"
+def dash(entry: str) -> int:
+    """Which line and marker tell an entry from others of its color; 0 of a whole algorithm."""
+    piece = entry.partition("-")[2]
+    return 1 + PIECES.index(piece) // len(_OTHERS) if piece else 0
 
 
 def draw(summary: Summary, options: Compare, directory: Path) -> None:
@@ -69,7 +83,7 @@ def cell_means(cells: pd.DataFrame) -> Figure:
     height = 0.35 + 0.13 * len(schemes) * (len(algorithms) + 1)
     with mpl.rc_context(STYLE):
         figure = Figure(
-            figsize=(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, rows * height + 0.75),
+            figsize=(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, rows * height + 0.55),
             layout="constrained",
         )
         panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flatten()
@@ -82,14 +96,7 @@ def cell_means(cells: pd.DataFrame) -> Figure:
             axes.set_xlabel(f"{FRACTION} (IQM, 95 % interval)")
             axes.tick_params(labelbottom=True)
         worst = Line2D([], [], color="0.3", marker="|", linestyle="", label="worst learner")
-        handles = [_handle(name) for name in algorithms]
-        figure.legend(
-            handles=[*handles, worst],
-            loc="outside lower center",
-            ncols=7 if columns > 1 else 3,
-            frameon=False,
-            columnspacing=1.2,
-        )
+        _add_legend(figure, [*(_handle(name) for name in algorithms), worst])
         return figure
 
 
@@ -102,7 +109,7 @@ def _draw_cells(
         offset = (algorithms.index(name) - (len(algorithms) - 1) / 2) * step
         y = schemes.index(cell["scheme"]) + offset
         axes.plot([cell["low"], cell["high"]], [y, y], color=color(str(name)), linewidth=1.4)
-        axes.plot(cell["iqm"], y, "o", color=color(str(name)))
+        axes.plot(cell["iqm"], y, _MARKERS[dash(str(name))], color=color(str(name)))
         axes.plot(cell["worst"], y, "|", color=color(str(name)), markersize=6.0)
     axes.set_yticks(range(len(schemes)), schemes)
     axes.set_ylim(len(schemes) - 0.5, -0.5)
@@ -118,7 +125,23 @@ def _percent(value: float, _: float) -> str:
 
 
 def _handle(algorithm: str) -> Line2D:
-    return Line2D([], [], color=color(algorithm), marker="o", label=label(algorithm))
+    marker = _MARKERS[dash(algorithm)]
+    return Line2D([], [], color=color(algorithm), marker=marker, label=label(algorithm))
+
+
+def _add_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
+    """Below the axes, in as many columns as fit, the figure being made as much higher."""
+    width, height = figure.get_size_inches()
+    column = 0.45 + 0.05 * max(len(str(handle.get_label())) for handle in handles)
+    columns = min(max(int(width / column), 1), len(handles))
+    figure.set_size_inches(width, height + 0.15 * math.ceil(len(handles) / columns))
+    figure.legend(
+        handles=list(handles),
+        loc="outside lower center",
+        ncols=columns,
+        frameon=False,
+        columnspacing=1.2,
+    )
 
 
 def curves_figure(curves: pd.DataFrame, threshold: float) -> Figure:
@@ -131,11 +154,11 @@ def curves_figure(curves: pd.DataFrame, threshold: float) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
         axes = figure.add_subplot()
-        _draw_bands(axes, curves, "episode", "iqm")
+        handles = _draw_bands(axes, curves, "episode", "iqm")
         axes.axhline(threshold, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
         axes.set(xlabel="Training episodes", ylabel=f"{FRACTION} (IQM)")
         axes.yaxis.set_major_formatter(_percent)
-        axes.legend(loc="best", frameon=True, framealpha=0.9, edgecolor="0.8")
+        _add_legend(figure, handles)
         return figure
 
 
@@ -149,27 +172,40 @@ def profiles_figure(profiles: pd.DataFrame, threshold: float) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
         axes = figure.add_subplot()
-        _draw_bands(axes, profiles, "fraction", "share")
+        handles = _draw_bands(axes, profiles, "fraction", "share")
         axes.axvline(threshold, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
         axes.set(xlabel=f"{FRACTION}, $\\tau$", ylabel="Learners that reach $\\tau$ or more")
         axes.set_ylim(-0.02, 1.04)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(_percent)
-        axes.legend(loc="best", frameon=True, framealpha=0.9, edgecolor="0.8")
+        _add_legend(figure, handles)
         return figure
 
 
-def _draw_bands(axes: Axes, rows: pd.DataFrame, x: str, y: str) -> None:
+def _draw_bands(axes: Axes, rows: pd.DataFrame, x: str, y: str) -> list[Line2D]:
+    """The lines with their bands; returned are the lines."""
+    lines = []
     for name, own in rows.groupby("algorithm", sort=False):
         hue = color(str(name))
-        axes.fill_between(own[x], own["low"], own["high"], color=hue, alpha=0.2, linewidth=0)
-        axes.plot(own[x], own[y], color=hue, linewidth=1.3, label=label(str(name)))
+        axes.fill_between(own[x], own["low"], own["high"], color=hue, alpha=0.15, linewidth=0)
+        lines += axes.plot(
+            own[x],
+            own[y],
+            color=hue,
+            linestyle=_DASHES[dash(str(name))],
+            linewidth=1.3,
+            label=label(str(name)),
+        )
     axes.margins(x=0.0)
     axes.grid(color="0.92", linewidth=0.5)
+    return lines
 
 
 def improvement_bars(improvements: pd.DataFrame) -> Figure:
-    """For each pair, how probably a learner of the algorithm on the left is the better one.
+    """How probably a learner of one algorithm is better than one of another.
+
+    All pairs are shown, the algorithm on the left beside that on the right; where there are more
+    than :data:`MOST_COLUMNS` algorithms, the first beside each other one.
 
     Args:
         improvements: as :func:`hyuav.comparison.statistics.improvements` gives them.
@@ -177,6 +213,9 @@ def improvement_bars(improvements: pd.DataFrame) -> Figure:
     names = list(dict.fromkeys(improvements["algorithm"]))
     order = improvements["algorithm"].map(names.index) < improvements["other"].map(names.index)
     pairs = improvements[order]
+    alone = len(names) > MOST_COLUMNS
+    if alone:
+        pairs = pairs[pairs["algorithm"] == names[0]]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(COLUMN_WIDTH, 0.75 + 0.2 * len(pairs)), layout="constrained")
         axes = figure.add_subplot()
@@ -188,13 +227,15 @@ def improvement_bars(improvements: pd.DataFrame) -> Figure:
                 [pair["probability"]] * 2, [place - 0.3, place + 0.3], color=hue, linewidth=1.8
             )
         axes.axvline(0.5, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
-        axes.set_yticks(places, [label(name) for name in pairs["algorithm"]])
+        axes.set_yticks(places, [label(name) for name in pairs["other" if alone else "algorithm"]])
         axes.set_ylim(len(pairs) - 0.4, -0.6)
         axes.set_xlim(-0.02, 1.02)
-        axes.set_xlabel("Probability that left is better than right")
+        better = label(names[0]) if alone else "left"
+        axes.set_xlabel(f"P({better} better than {'the other' if alone else 'right'})")
         axes.xaxis.set_major_formatter(_percent)
         axes.grid(color="0.92", linewidth=0.5, axis="x")
         axes.set_axisbelow(True)
-        right = axes.secondary_yaxis("right")
-        right.set_yticks(places, [label(name) for name in pairs["other"]])
+        if not alone:
+            right = axes.secondary_yaxis("right")
+            right.set_yticks(places, [label(name) for name in pairs["other"]])
         return figure
