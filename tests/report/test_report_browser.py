@@ -6,12 +6,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from playwright.sync_api import Page
 
 from browser import DESKTOP, PHONE, browser_page, needs_chromium
+from hyuav.comparison.plan import PIECES
+from hyuav.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.evaluation import LABELS
-from hyuav.report.page import write_report
+from hyuav.report.page import write_comparison_report, write_report
 from hyuav.report.reading import readable_flights
 from hyuav.runs import METRIC_COLUMNS, RunDirectory
 from recipe_calls import TINY_COMPARISON, Call
@@ -201,6 +204,28 @@ def test_an_empty_directory_opens(folder: str, tmp_path: Path) -> None:
     with opened(write_report(tmp_path / "empty"), PHONE) as page:
         notes = page.locator(".note").all_text_contents()
         assert len(notes) == page.locator("h2").count()
+
+
+@BOTH
+def test_an_ablation_with_many_pieces_is_legible(tmp_path: Path, screen: tuple[int, int]) -> None:
+    entries = ["ddpg_robust", *(f"ddpg_robust-{piece}" for piece in PIECES)]
+    learner = {"scenario": "two_clusters", "scheme": "hybrid", "num_slots": 10, "seed": 0}
+    rows = [
+        {"algorithm": entry, **learner, "episode": episode, "fraction": 0.9 + 0.001 * episode}
+        for entry in entries
+        for episode in (10, 20)
+    ]
+    unknown = {"episodes_to_threshold": None, "seconds_to_threshold": None, "seconds": 1.0}
+    pd.DataFrame(rows).assign(**unknown).to_parquet(tmp_path / RESULTS_FILE)
+    pd.DataFrame(rows).to_parquet(tmp_path / CURVES_FILE)
+    with opened(write_comparison_report(tmp_path), screen) as page:
+        misplaced = page.evaluate(MISPLACED)
+        if screen == PHONE:  # there the legend scrolls
+            scrolled = ("cut off: without", "cut off: worst")
+            misplaced = [part for part in misplaced if not part.startswith(scrolled)]
+        assert misplaced == []
+        legend = page.locator("figure").first.locator(".legendtext")
+        assert legend.count() == len(entries) + 1
 
 
 def test_a_comparison_opens(call: Call, tmp_path: Path) -> None:

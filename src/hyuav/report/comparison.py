@@ -96,7 +96,7 @@ def _trained(directory: Path) -> Iterator[tuple[str, RunDirectory, RunConfigurat
         except InputError:
             continue
         horizon = f"_T{configuration.scenario.num_slots}"
-        entry = path.name.removesuffix(f"_{configuration.scenario_name}{horizon}")
+        entry = path.name.partition(f"_{configuration.scenario_name}{horizon}")[0]
         if run.best_checkpoint.is_file():
             yield entry, run, configuration
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from hyuav.comparison.charts import color
+from hyuav.comparison.charts import color, dash
 from hyuav.comparison.statistics import learning_curves, performance_profiles
 from hyuav.comparison.tables import label
 from hyuav.evaluation import LABELS
@@ -36,6 +36,10 @@ QUANTITIES = {
     "best_evaluation": "Best noise-free accumulated reward (bps/Hz)",
 }
 """Columns of the metrics that can be drawn, with the title of their axis."""
+
+_ENTRY_DASHES = ("solid", "8px,4px", "2px,3px", "10px,3px,2px,3px", "18px,4px")
+_ENTRY_MARKERS = ("circle", "square", "triangle-up", "diamond", "triangle-down")
+"""Of :func:`hyuav.comparison.charts.dash`."""
 
 _HORIZON_DASHES = ("solid", "8px,3px,2px,3px", "2px,2px", "10px,4px")
 
@@ -170,13 +174,13 @@ def comparison_figures(
         "Interquartile means of the best weights so far, with 95 % intervals": bands_figure(
             learning_curves(curves),
             ("episode", "Training episodes"),
-            ("iqm", "Share of the optimum (%, IQM)"),
+            ("iqm", "Share of the optimum (%)"),
             threshold,
         ),
         "Share of learners that reach a share of the optimum, with 95 % intervals": bands_figure(
             profiles,
             ("fraction", "Share of the optimum, τ (%)"),
-            ("share", "Learners that reach τ or more (%)"),
+            ("share", "Learners that reach τ (%)"),
             threshold,
         ),
     }
@@ -221,7 +225,7 @@ def cells_figure(cells: pd.DataFrame, threshold: float) -> go.Figure:
                 "thickness": 2,
             },
             mode="markers",
-            marker={"color": hue, "size": 7},
+            marker={"color": hue, "size": 7, "symbol": _ENTRY_MARKERS[dash(str(algorithm))]},
             name=text,
             legendgroup=text,
             hovertemplate=f"{text}: %{{x:.1f}} %<extra></extra>",
@@ -232,10 +236,10 @@ def cells_figure(cells: pd.DataFrame, threshold: float) -> go.Figure:
         figure.add_hline(y=boundary + 0.5, line={"color": GRID_COLOR, "width": 1})
     line = {"color": OPTIMUM_COLOR, "width": 1.2, "dash": DASHES["optimum"]}
     figure.add_vline(x=100 * threshold, line=line)
-    height = 26 + 9 * len(algorithms)
+    height, below = 26 + 9 * len(algorithms), _legend_height(len(algorithms) + 1)
     figure.update_layout(
-        height=170 + len(rows) * height,
-        margin={"l": 110, "r": 20, "t": 20, "b": 110},
+        height=60 + below + len(rows) * height,
+        margin={"l": 110, "r": 20, "t": 20, "b": below},
         xaxis=axis("Share of the optimum (%)", nticks=7),
         yaxis=axis("", range=[-0.5, len(rows) - 0.5], showgrid=False)
         | {"tickvals": list(range(len(rows))), "ticktext": rows[::-1]},
@@ -274,7 +278,7 @@ def bands_figure(
             x=across,
             y=(100 * own[y[0]]).tolist(),
             mode="lines",
-            line={"color": hue, "width": 2.2},
+            line={"color": hue, "width": 2.2, "dash": _ENTRY_DASHES[dash(str(algorithm))]},
             name=text,
             legendgroup=text,
             hovertemplate=f"{text}, %{{x:.4g}}: %{{y:.1f}} %<extra></extra>",
@@ -284,14 +288,20 @@ def bands_figure(
         figure.add_vline(x=100 * threshold, line=line)
     else:
         figure.add_hline(y=100 * threshold, line=line)
+    below = _legend_height(rows["algorithm"].nunique())
     figure.update_layout(
-        height=420,
-        margin={"l": 60, "r": 20, "t": 20, "b": 100},
+        height=320 + below,
+        margin={"l": 60, "r": 20, "t": 20, "b": below},
         xaxis=axis(x[1], nticks=7),
         yaxis=axis(y[1], nticks=8),
         legend=_legend_below(),
     )
     return figure
+
+
+def _legend_height(entries: int) -> int:
+    """Pixels below a plot for its axis title and a legend of four entries in a row."""
+    return 80 + 20 * math.ceil(entries / 4)
 
 
 def _legend_below() -> dict[str, Any]:
