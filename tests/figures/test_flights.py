@@ -18,6 +18,7 @@ def test_the_flight_map_shows_every_scheme_that_was_flown(
     figure = flight_map(scenario, evaluation.flights)
     assert len(figure.axes) == len(FLIGHT_PANELS)
     assert {"Re-LT", "Ja-LT", "UE", "helper relays", "helper jams"} <= set(texts(figure))
+    assert {"coverage of L", "start", "end"} <= set(texts(figure))
     assert "Re-OT" not in texts(figure)
 
 

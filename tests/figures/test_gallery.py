@@ -133,6 +133,6 @@ def test_runs_within_are_drawn_too_and_the_papers_algorithm_beside(
     within = train(run.path / "elsewhere", configuration, OFF, console())
     draw(run, ["learning_curves"], console())
     names = set(pd.read_csv(run.figures / "learning_curves.csv")["training"])
-    assert names == {"ddpg", "ddpg, as in the paper"}
+    assert names == {"DDPG", "DDPG, as in the paper"}
     assert drawn(within) == {"learning_curves"}
     assert not list(RunDirectory(run.path / AS_IN_PAPER).figures.iterdir())

@@ -2,6 +2,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.colors import to_hex
+from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure
 
 from hyuav.evaluation import Evaluation
 from hyuav.figures import COLORS
@@ -15,6 +17,12 @@ def summaries(evaluation: Evaluation) -> list[dict[str, Any]]:
     return [evaluation.summary, shorter | {"schemes": kept}]
 
 
+def bars_of(figure: Figure) -> list[ErrorbarContainer]:
+    """The curves with intervals, in the order in which they were drawn."""
+    (axes,) = figure.axes
+    return [own for own in axes.containers if isinstance(own, ErrorbarContainer)]
+
+
 def test_the_table_has_a_row_for_each_scheme_and_horizon_in_order(evaluation: Evaluation) -> None:
     table = horizon_table(summaries(evaluation))
     assert table["num_slots"].tolist() == [4] * 5 + [10] * 6
@@ -24,20 +32,28 @@ def test_the_table_has_a_row_for_each_scheme_and_horizon_in_order(evaluation: Ev
     assert [row["mean"], [row["low"], row["high"]]] == [expected["mean"], expected["ci95"]]
 
 
-def test_every_scheme_has_a_curve_with_intervals_and_every_optimum_a_line(
+def test_every_scheme_and_every_optimum_has_a_curve_with_intervals(
     evaluation: Evaluation,
 ) -> None:
     table = horizon_table(summaries(evaluation))
     figure = sum_rates_by_horizon(table)
-    (axes,) = figure.axes
-    drawn = {str(container.get_label()): container for container in axes.containers}
-    assert list(drawn) == ["Proposed", "Re-LT", "Ja-LT"]
-    line, _, (bars,) = drawn["Re-LT"]
-    own = table[table["scheme"] == "re_lt"]
-    np.testing.assert_allclose(np.asarray(line.get_ydata(), dtype=float), own["mean"])
-    ends = [np.asarray(segment)[:, 1].astype(float) for segment in bars.get_segments()]
-    np.testing.assert_allclose(ends, own[["low", "high"]])
-    optima = [line for line in axes.lines if line.get_marker() == "None"]
-    assert [to_hex(line.get_color()).upper() for line in optima] == [
+    drawn = {str(own.get_label()): own for own in bars_of(figure)}
+    optima = ["Optimum", "Ja-optimum", "Re-optimum"]
+    assert list(drawn) == [*optima, "Proposed", "Re-LT", "Ja-LT"]
+    for label, scheme in (("Re-LT", "re_lt"), ("Ja-optimum", "ja_optimum")):
+        line, _, (bars,) = drawn[label]
+        own = table[table["scheme"] == scheme]
+        np.testing.assert_allclose(np.asarray(line.get_ydata(), dtype=float), own["mean"])
+        ends = [np.asarray(segment)[:, 1].astype(float) for segment in bars.get_segments()]
+        np.testing.assert_allclose(ends, own[["low", "high"]])
+    dotted = [drawn[name].lines[0] for name in optima]
+    assert [to_hex(line.get_color()).upper() for line in dotted] == [
         COLORS[name] for name in ("proposed", "ja_ot", "re_ot")
     ]
+
+
+def test_no_bar_hides_another_and_all_stand_by_their_horizon(evaluation: Evaluation) -> None:
+    figure = sum_rates_by_horizon(horizon_table(summaries(evaluation)))
+    places = [np.asarray(own.lines[0].get_xdata(), dtype=float) for own in bars_of(figure)]
+    assert len({own[-1] for own in places}) == len(places)
+    assert max(abs(own[-1] - 10) for own in places) < 1.0

@@ -109,10 +109,11 @@ def draw_flight(
     for relay, first, last in _runs_of_one_mode(relays):
         axes.plot(*path[first : last + 1].T, **_slot_style(color, relay=relay) | {"marker": ""})
         axes.plot(*path[first + 1 : last + 1].T, **_slot_style(color, relay=relay) | _DOTS_ONLY)
-    ends = _DOTS_ONLY | {"color": color, "markeredgecolor": "white"}
+    edge = {"markeredgecolor": "white", "markeredgewidth": _width(0.5)}
+    ends = _DOTS_ONLY | {"color": color} | edge
     axes.plot(*path[0], **ends | {"marker": "D", "markersize": _size(1.3)})
     if len(path) > 1:
-        axes.plot(*path[-1], **ends | {"marker": "*", "markersize": _size(2.0)})
+        axes.plot(*path[-1], **ends | {"marker": "*", "markersize": _size(2.6)})
     if label is not None:
         axes.plot([], [], color=color, linewidth=_width(1.3), label=label)
 

@@ -127,7 +127,7 @@ def _draw_links(axes: Axes, scenario: Scenario, helper: Point, now: pd.Series) -
         axes.plot(*zip(*ends, strict=True), **style | {"linewidth": 1.6})
     if not now["relay"]:
         ends = (helper, scenario.eavesdropper_position)
-        axes.plot(*zip(*ends, strict=True), **JAMMING, zorder=2.2)
+        axes.plot(*zip(*ends, strict=True), **JAMMING, zorder=2.6)
 
 
 def _draw_rates(axes: Axes, slots: pd.DataFrame, flown: int) -> None:

@@ -89,7 +89,7 @@ def flight_map(scenario: Scenario, flights: pd.DataFrame) -> Figure:
         flights: a row per slot, as in :attr:`Evaluation.flights`; each scheme's first is drawn.
     """
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(PAGE_WIDTH, 2.9), layout="constrained")
+        figure = Figure(figsize=(PAGE_WIDTH, 3.05), layout="constrained")
         row: list[Axes] = list(figure.subplots(1, len(FLIGHT_PANELS), sharey=True))
         for axes, (optimum, schemes) in zip(row, FLIGHT_PANELS.items(), strict=True):
             draw_scenario(axes, scenario)
@@ -104,9 +104,9 @@ def flight_map(scenario: Scenario, flights: pd.DataFrame) -> Figure:
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
         }
         figure.legend(
-            handles=[*handles.values(), *mode_handles()],
+            handles=[*handles.values(), _coverage_handle(), *mode_handles(), *_end_handles()],
             loc="outside lower center",
-            ncols=6,
+            ncols=5,
             frameon=False,
             columnspacing=1.4,
         )

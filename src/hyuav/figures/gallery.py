@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 from rich.console import Console
 
+from hyuav.comparison.tables import label
 from hyuav.errors import InputError
 from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE, LABELS, OPTIMA
 from hyuav.experiment import LEARNED
@@ -96,11 +97,10 @@ class Finished:
 
     def trainings(self) -> dict[str, RunDirectory]:
         """The trainings on the scenario, by what they are called."""
-        algorithm = self.run.configuration().algorithm_name
-        trainings = {algorithm: self.run}
+        trainings = {label(self.run.configuration().algorithm_name): self.run}
         paper = RunDirectory(self.run.path / AS_IN_PAPER)
         if paper.config_file.exists():
-            trainings[f"{paper.configuration().algorithm_name}, as in the paper"] = paper
+            trainings[f"{label(paper.configuration().algorithm_name)}, as in the paper"] = paper
         return trainings
 
     def optima(self) -> dict[str, float]:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -54,25 +55,24 @@ def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
         figure = Figure(figsize=(COLUMN_WIDTH, 3.0), layout="constrained")
         axes = figure.add_subplot()
         curves = {str(name): rows for name, rows in table.groupby("scheme")}
-        for scheme in (name for name in OPTIMA.values() if name in curves):
-            rows = curves[scheme]
-            axes.plot(rows["num_slots"], rows["mean"], color=COLORS[scheme], linestyle=DOTTED)
+        drawn = [name for name in (*OPTIMA.values(), *COMPARED) if name in curves]
+        aside = dict(zip(drawn, _aside(len(drawn), table["num_slots"]), strict=True))
         handles = []
-        for scheme in (name for name in COMPARED if name in curves):
-            rows = curves[scheme]
-            mean = rows["mean"]
-            drawn = axes.errorbar(
-                rows["num_slots"],
-                mean,
-                yerr=[mean - rows["low"], rows["high"] - mean],
+        for scheme in drawn:
+            rows, learned = curves[scheme], scheme in COMPARED
+            bars = axes.errorbar(
+                rows["num_slots"] + aside[scheme],
+                rows["mean"],
+                yerr=[rows["mean"] - rows["low"], rows["high"] - rows["mean"]],
                 color=COLORS[scheme],
-                linestyle=LINES[scheme],
-                marker=MARKERS[scheme],
-                capsize=2.0,
+                linestyle=LINES[scheme] if learned else DOTTED,
+                marker=MARKERS.get(scheme, ""),
+                capsize=2.0 if learned else 1.0,
                 elinewidth=0.8,
                 label=LABELS[scheme],
             )
-            handles.append(drawn)
+            if learned:
+                handles.append(bars)
         optimum = Line2D([], [], color="0.3", linestyle=DOTTED, label="its optimum")
         axes.set_xticks(sorted(set(table["num_slots"])))
         axes.set(xlabel="Time horizon (slots)", ylabel="Secrecy sum-rate (bps/Hz)")
@@ -87,3 +87,10 @@ def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
             columnspacing=1.2,
         )
         return figure
+
+
+def _aside(curves: int, horizons: "pd.Series[int]") -> list[float]:
+    """How far each curve is moved along the axis, in slots, so that no bar hides another."""
+    places = np.unique(horizons)
+    gap = float(np.diff(places).min()) if len(places) > 1 else 1.0
+    return [0.025 * gap * (curve - (curves - 1) / 2) for curve in range(curves)]
