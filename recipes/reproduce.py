@@ -4,7 +4,7 @@ They are trained twice: by the robust variant of DDPG, and exactly as in the pap
 
 python recipes/reproduce.py
 python recipes/reproduce.py scenario=random_disk training.num_episodes=600
-python recipes/reproduce.py seeds=10 num_slots=[10,12,14,16,18,20] also=random_disk
+python recipes/reproduce.py seeds=10 further_seeds=5 num_slots=[10,12,14,16,18,20] also=random_disk
 python recipes/reproduce.py figures=[learning_curves,trajectories]
 python recipes/reproduce.py hydra.run.dir=runs/NAME
 """
@@ -59,6 +59,8 @@ class Reproduce(Parameters):
     """How the main job is done."""
 
     seeds: int = parameter(count(1, 10_000), 1)
+    further_seeds: int | None = parameter(optional(count(1, 10_000)), None)
+    """Over other horizons and presets than the scenario's own; None for as many as ``seeds``."""
     num_slots: tuple[int, ...] | None = parameter(
         optional(one_or_more(count(), "numbers of slots")), None, symbol="T"
     )
@@ -107,16 +109,14 @@ def reproduce(config: Config, directory: Path) -> None:
         config,
         Console(),
     )
-    seeds = range(options.seed, options.seed + options.seeds)
-    learners = [Learner(scheme, seed) for scheme in SCHEMES for seed in seeds]
-    own = RunConfiguration.from_dict({**config, "learners": learners})
+    own = RunConfiguration.from_dict({**config, "learners": _learners(options, options.seeds)})
     scenario, console = own.scenario, work.console
     others = _other_horizons(scenario, options)
     longest = max([scenario.num_slots, *others])
     require_resolution(work.evaluation.resolution, scenario.map_side, longest)
     further = _on_further_presets(own, options)
 
-    run = work.train(directory, _over_horizons(own, (scenario.num_slots, *others)))
+    run = work.train(directory, _over_horizons(own, options, others))
     as_in_paper = dataclasses.replace(own, algorithm_name="ddpg", algorithm=DDPG())
     weights = partial(_candidates, as_in_paper, options, console)
     paper_run = work.train(directory / AS_IN_PAPER, as_in_paper, weights)
@@ -197,14 +197,26 @@ def _other_horizons(scenario: Scenario, options: Reproduce) -> list[int]:
     return others
 
 
-def _over_horizons(own: RunConfiguration, horizons: Sequence[int]) -> RunConfiguration:
-    """The same with its learners over each horizon."""
-    learners = tuple(
-        dataclasses.replace(learner, num_slots=num_slots)
-        for num_slots in horizons
-        for learner in own.learners
+def _learners(options: Reproduce, seeds: int | None) -> tuple[Learner, ...]:
+    """So many of each scheme."""
+    several = range(options.seed, options.seed + (seeds or options.seeds))
+    return tuple(Learner(scheme, seed) for scheme in SCHEMES for seed in several)
+
+
+def _over_horizons(
+    own: RunConfiguration, options: Reproduce, others: Sequence[int]
+) -> RunConfiguration:
+    """The same with learners over the other horizons too."""
+    horizon = own.scenario.num_slots
+    further = _learners(options, options.further_seeds)
+    learners = [(horizon, learner) for learner in own.learners]
+    learners += [(num_slots, learner) for num_slots in others for learner in further]
+    return dataclasses.replace(
+        own,
+        learners=tuple(
+            dataclasses.replace(learner, num_slots=num_slots) for num_slots, learner in learners
+        ),
     )
-    return dataclasses.replace(own, learners=learners)
 
 
 def _on_further_presets(own: RunConfiguration, options: Reproduce) -> list[RunConfiguration]:
@@ -219,6 +231,7 @@ def _on_further_presets(own: RunConfiguration, options: Reproduce) -> list[RunCo
             own,
             scenario_name=name,
             scenario=dataclasses.replace(own.scenario, ue_positions=PRESETS[name]),
+            learners=_learners(options, options.further_seeds),
         )
         for name in presets
     ]

@@ -6,6 +6,7 @@ import statistics
 import time
 from collections import Counter
 from collections.abc import Mapping
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +25,19 @@ MEASURED = Path("runs/reliability")
 """Where the figures of docs/reliability.md are written."""
 
 
-def run_to_the_end(directory: Path, configuration: RunConfiguration) -> float:
-    """Seconds that it took."""
-    started = time.monotonic()
+def begun(directory: Path, configuration: RunConfiguration) -> BaseProcess:
+    """A training that has its run directory by now, whose life begins."""
     running = process(directory, configuration)
     running.start()
+    while running.is_alive() and not RunDirectory(directory).exists:
+        time.sleep(0.001)
+    return running
+
+
+def run_to_the_end(directory: Path, configuration: RunConfiguration) -> float:
+    """Seconds that it took from the run directory on."""
+    running = begun(directory, configuration)
+    started = time.monotonic()
     running.join()
     assert running.exitcode == 0
     return time.monotonic() - started
@@ -36,8 +45,7 @@ def run_to_the_end(directory: Path, configuration: RunConfiguration) -> float:
 
 def kill_after(seconds: float, directory: Path, configuration: RunConfiguration) -> bool:
     """Whether it was still alive to be killed."""
-    running = process(directory, configuration)
-    running.start()
+    running = begun(directory, configuration)
     running.join(seconds)
     running.kill()
     running.join()
@@ -53,8 +61,6 @@ def write_figures(name: str, figures: Mapping[str, Any]) -> None:
 def stage(directory: Path) -> str:
     """What was found after a kill."""
     run = RunDirectory(directory)
-    if not run.exists:
-        return "before the run was there"
     if not run.last_checkpoint.exists():
         return "between two checkpoints' names"
     (first, *_) = load_checkpoint(run.last_checkpoint, "training")["training"]["cohorts"]
@@ -87,6 +93,7 @@ def test_a_killed_training_ends_with_the_numbers_of_an_unbroken_one(
         assert differences(outcome(directory), expected) == []
     figures = {
         "kills": kills,
+        "seconds of life": round(lifetime, 2),
         "ended as the unbroken training": kills,
         "while a file was being written": torn,
         "numbers and rows compared each time": len(expected),
@@ -96,14 +103,33 @@ def test_a_killed_training_ends_with_the_numbers_of_an_unbroken_one(
 
 
 @pytest.mark.slow
-def test_a_training_that_is_killed_again_and_again_ends_so_too(tmp_path: Path) -> None:
+def test_a_training_that_is_killed_while_it_is_loading_ends_so_too(tmp_path: Path) -> None:
     configuration = small("never")
-    lifetime = run_to_the_end(tmp_path / "unbroken", configuration)
+    run_to_the_end(tmp_path / "unbroken", configuration)
+    expected, kills = outcome(tmp_path / "unbroken"), 10
+    for number in range(kills):
+        directory = tmp_path / f"killed-{number}"
+        running = process(directory, configuration)
+        running.start()
+        running.join(0.1 * number)
+        running.kill()
+        running.join()
+        run_to_the_end(directory, configuration)
+        assert differences(outcome(directory), expected) == []
+    write_figures("kills_while_loading", {"kills": kills, "numbers compared": len(expected)})
+
+
+@pytest.mark.slow
+def test_a_training_that_is_killed_again_and_again_ends_so_too(tmp_path: Path) -> None:
+    configuration, started = small("never"), time.monotonic()
+    run_to_the_end(tmp_path / "unbroken", configuration)
+    lifetime = time.monotonic() - started  # with the loading, which each of them begins with
     luck, killed = random.Random(1), 0
-    while kill_after(luck.uniform(0.3, 0.6) * lifetime, tmp_path / "killed", configuration):
+    while kill_after(luck.uniform(0.5, 0.9) * lifetime, tmp_path / "killed", configuration):
         killed += 1
     assert killed > 0
     assert differences(outcome(tmp_path / "killed"), outcome(tmp_path / "unbroken")) == []
+    write_figures("kills_one_after_another", {"kills": killed})
 
 
 @pytest.mark.slow

@@ -24,10 +24,11 @@ JOB = [
 def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
     call: Call, tmp_path: Path
 ) -> None:
-    call("reproduce", "seeds=2", "num_slots=[8,10]", "also=random_disk", *JOB)
+    seeds = ("seeds=2", "further_seeds=1")
+    call("reproduce", *seeds, "num_slots=[8,10]", "also=random_disk", *JOB)
     job = tmp_path / "job"
     learners = RunDirectory(job).configuration().learners
-    assert [own.num_slots for own in learners] == [8] * 6 + [10] * 6
+    assert [own.num_slots for own in learners] == [8] * 6 + [10] * 3
     files = {path.name for path in (job / "figures").iterdir()}
     prints = {f"{name}.{suffix}" for name in FIGURES for suffix in ("pdf", "png", "csv")}
     assert files == prints - {"animation.pdf", "animation.png"} | {
@@ -35,11 +36,13 @@ def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
     }
     horizons = pd.read_csv(job / "figures" / "horizons.csv")
     assert horizons.groupby("num_slots")["scheme"].count().to_dict() == {8: 8, 10: 8}
-    assert set(horizons[horizons["scheme"] == "proposed"]["learners"]) == {2}
+    proposed = horizons[horizons["scheme"] == "proposed"].set_index("num_slots")
+    assert proposed["learners"].to_dict() == {8: 2, 10: 1}
     beside = RunDirectory(job / "random_disk")
     configuration = beside.configuration()
     assert configuration.scenario.ue_positions == PRESETS["random_disk"]
     assert configuration.scenario.num_slots == 8
+    assert len(configuration.learners) == 3
     assert (beside.figures / "trajectories.pdf").exists()
     paper = RunDirectory(job / "as_in_paper").metrics()
     assert len(paper) == 4 * 6
