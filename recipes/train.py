@@ -18,6 +18,7 @@ from hyuav.configuration import (
     given,
     override,
     recipe,
+    remove_if_empty,
     section,
     telling_how_to_go_on,
 )
@@ -29,6 +30,7 @@ from hyuav.parameters import (
     Parameters,
     choice,
     count,
+    mapping,
     one_or_more,
     optional,
     parameter,
@@ -36,7 +38,7 @@ from hyuav.parameters import (
     thread_count,
 )
 from hyuav.report.page import write_run_report
-from hyuav.runs import RunConfiguration, RunDirectory, mapping
+from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.system import SCHEMES
 from hyuav.tracking import LoggerParameters
 
@@ -71,7 +73,7 @@ def main(config: Config, directory: Path) -> None:
     """Train, and say where the run is."""
     options = section(config, Train)
     if options.resume is not None:
-        directory.rmdir()  # which Hydra made for a new training
+        remove_if_empty(directory)  # which Hydra made for a new training
         go_on(options.resume, config)
         return
     torch.set_num_threads(options.threads)
@@ -105,7 +107,7 @@ def go_on(path: str, config: Config) -> None:
         InputError: there is none, or something else was asked for beside it.
     """
     for name in given() - {"resume", "device", "threads"}:
-        if not name.startswith("logger."):
+        if name == "hydra.run.dir" or not name.startswith(("logger.", "hydra.")):
             accepted = "nothing beside it but device, threads and logger"
             raise InputError(f"{rejection('resume', path, accepted)}, not {name}")
     asked = RunDirectory(path).request()

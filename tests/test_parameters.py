@@ -328,3 +328,9 @@ def test_an_unknown_field_is_answered_with_those_there_are(name: Any) -> None:
 def test_a_scenario_needs_ues() -> None:
     with pytest.raises(InputError, match=r"^scenario: ue_positions is missing$"):
         Scenario.from_dict({"num_slots": 3})
+
+
+@pytest.mark.parametrize("values", [None, 3, "two_clusters", [1, 2]])
+def test_a_record_is_made_of_names_with_values_alone(values: Any) -> None:
+    with pytest.raises(InputTypeError, match=r"^scenario = .*: expected names with values$"):
+        Scenario.from_dict(values)

@@ -21,14 +21,14 @@ from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
 from hydra.types import RunMode
-from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf import MISSING, DictConfig, OmegaConf
+from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
 
 from hyuav.configuration_files import read_files_as_data
-from hyuav.errors import Halted, InputError, Interrupted, one_line, require_choice
+from hyuav.errors import Halted, InputError, Interrupted, one_line, rejection, require_choice
 from hyuav.interruption import interrupted_by_sigterm
 from hyuav.learning.algorithms import ALGORITHMS
-from hyuav.parameters import Parameters, refuse_unknown
+from hyuav.parameters import Parameters, mapping, refuse_unknown
 from hyuav.scenario import PRESETS, Scenario
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
@@ -82,6 +82,7 @@ def recipe(
     store = ConfigStore.instance()
     node: dict[str, Any] = options().to_dict()
     node |= {section: parameters().to_dict() for section, parameters in sections.items()}
+    names = [*node, *groups]
     sweep, _, own = run_directory.partition(f"{NOW}_")
     node["hydra"] = {
         "run": {"dir": run_directory},
@@ -107,9 +108,9 @@ def recipe(
             composed = True
             directory = Path(HydraConfig.get().runtime.output_dir)
             try:
-                function(_plain(config, groups), directory)
+                function(_plain(config, names, groups, sections), directory)
             except InputError as error:
-                _remove_if_empty(directory)
+                remove_if_empty(directory)
                 if HydraConfig.get().mode is RunMode.MULTIRUN:
                     raise  # the other jobs go on, and Hydra says which one it was
                 _refuse(str(error))  # here, before Hydra adds lines of its own
@@ -145,23 +146,42 @@ def recipe(
     return decorate
 
 
-def _plain(config: DictConfig, groups: Iterable[str]) -> Config:
-    values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
-    assert isinstance(values, dict)
-    for group in groups:  # a user's own file need not repeat its name
-        values[group].setdefault("name", HydraConfig.get().runtime.choices[group])
-    return {str(key): value for key, value in values.items()}
+def _plain(
+    config: DictConfig, names: Iterable[str], groups: Iterable[str], sections: Iterable[str]
+) -> Config:
+    """The configuration in plain values, with exactly the entries that are named.
+
+    Raises:
+        InputError: another entry, a missing one, or a section without names.
+    """
+    try:
+        plain = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
+    except OmegaConfBaseException as error:
+        raise InputError(explain(error)) from None
+    values = mapping("configuration", plain)
+    refuse_unknown("configuration", values, names)
+    for name in names:
+        if name not in values:
+            raise InputError(f"configuration: {name} is missing")
+    for name in sections:
+        values[name] = mapping(name, values[name])
+    for name in groups:  # a user's own file need not repeat its name
+        member = HydraConfig.get().runtime.choices[name]
+        values[name] = {"name": member, **mapping(name, values[name])}
+    return values
 
 
-def _remove_if_empty(directory: Path) -> None:
+def remove_if_empty(directory: Path) -> None:
+    """Remove a directory that Hydra made and nothing was kept in."""
     if directory.is_dir() and not any(directory.iterdir()) and directory.resolve() != Path.cwd():
         directory.rmdir()
 
 
 def given() -> set[str]:
     """The names of the entries that the command line set."""
-    overrides = HydraConfig.get().overrides.task
-    return {override.partition("=")[0].lstrip("+~") for override in overrides}
+    overrides = HydraConfig.get().overrides
+    both = (*overrides.task, *overrides.hydra)
+    return {override.partition("=")[0].lstrip("+~") for override in both}
 
 
 @contextmanager
@@ -247,6 +267,8 @@ def explain(error: Exception) -> str:
                 names = [str(name) for name in known if name != "hydra"]
                 return _message(lambda: refuse_unknown(owner or "configuration", [key], names))
         error = cause
+    if isinstance(error, MissingMandatoryValue):
+        return rejection(str(error.full_key), MISSING, "a value")
     text = str(error).split("\n    full_key")[0].split("\nSee https")[0]
     return one_line(text)
 

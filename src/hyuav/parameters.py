@@ -188,6 +188,17 @@ def refuse_unknown(owner: str, names: Iterable[str], known: Iterable[str]) -> No
             raise InputError(f"{owner}: unknown field {brief(name)}: {hint}")
 
 
+def mapping(name: str, value: object) -> dict[str, Any]:
+    """Accept names with values.
+
+    Raises:
+        InputTypeError: it is something else.
+    """
+    if not isinstance(value, Mapping):
+        raise InputTypeError(rejection(name, value, "names with values"))
+    return {str(key): entry for key, entry in value.items()}
+
+
 def require_plain_yaml(path: Path) -> str:
     """The text of a YAML file whose content is no larger and no deeper than it looks.
 
@@ -256,9 +267,11 @@ class Parameters:
         """Build the record from plain values, such as a parsed YAML file or command line.
 
         Raises:
-            InputError: an unknown, missing or unacceptable field.
+            InputError: no names with values, or an unknown, missing or unacceptable field.
         """
         owner = cls.__name__.lower()
+        if not isinstance(values, Mapping):
+            raise InputTypeError(rejection(owner, values, "names with values"))
         fields = dataclasses.fields(cls)
         refuse_unknown(owner, values, [field.name for field in fields])
         for field in fields:

@@ -16,13 +16,13 @@ from omegaconf import OmegaConf
 from torch import Tensor
 
 from hyuav.durable import create_durably
-from hyuav.errors import BusyError, InputError, InputTypeError, rejection, require_choice
+from hyuav.errors import BusyError, InputError, rejection, require_choice
 from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.metrics import IDENTITY, parse_rows
-from hyuav.parameters import read_yaml, sequence
+from hyuav.parameters import mapping, read_yaml, sequence
 from hyuav.scenario import PRESETS, Scenario
 
 REPORT_FILE = "report.html"
@@ -125,13 +125,6 @@ def require_writable(name: str, directory: Path) -> None:
     except OSError as error:
         accepted = f"a writable place ({error.strerror})"
         raise InputError(rejection(name, str(directory), accepted)) from None
-
-
-def mapping(name: str, value: object) -> dict[str, Any]:
-    """Accept names with values."""
-    if not isinstance(value, Mapping):
-        raise InputTypeError(rejection(name, value, "names with values"))
-    return {str(key): entry for key, entry in value.items()}
 
 
 def named_scenario(values: object) -> tuple[str, Scenario]:

@@ -165,6 +165,20 @@ def test_a_straight_flight_too_fast_for_the_horizon_is_left_out_and_named(
     assert "Ja-LT is left out" in capsys.readouterr().out
 
 
+NAMED = ("train", "compare", "evaluate", "reproduce", "report", "draw", "dashboard", "benchmark")
+SECTIONS = {
+    "train": ("training", "logger"),
+    "compare": ("training", "evaluation", "logger"),
+    "evaluate": ("evaluation", "logger"),
+    "reproduce": ("training", "evaluation", "logger"),
+}
+ENTRIES = {
+    "train": ("logger",),
+    "compare": ("learners", "algorithm"),
+    "reproduce": ("seeds",),
+    "benchmark": ("parts",),
+}
+
 REFUSALS = [
     (
         ["train", "algorithm=ppo"],
@@ -195,6 +209,23 @@ REFUSALS = [
     (["evaluate"], "run is missing: expected run=DIRECTORY"),
     (["evaluate", "run=nowhere"], "run = 'nowhere': expected a run directory"),
     (["reproduce", "evaluation.episodes=1"], "episodes = 1: expected a whole number >= 2"),
+    (["train", "scenario.num_slots=???"], "scenario.num_slots = '???': expected a value"),
+    (["train", "logger.mode=${nope}"], "Interpolation key 'nope' not found"),
+    (["train", "+schem=relay"], "configuration: unknown field 'schem': did you mean 'scheme'?"),
+    (["train", "resume=base", "hydra.run.dir=base"], "not hydra.run.dir"),
+    (["train", "resume=base", "hydra.run.dir=."], "not hydra.run.dir"),
+    *(([recipe, "+foo=1"], "configuration: unknown field 'foo': one of ") for recipe in NAMED),
+    *(
+        ([recipe, f"{section}={value}"], f"{section} = {shown}: expected names with values")
+        for recipe, sections in SECTIONS.items()
+        for section in sections
+        for value, shown in (("null", None), (3, 3))
+    ),
+    *(
+        ([recipe, f"~{name}"], f"configuration: {name} is missing")
+        for recipe, names in ENTRIES.items()
+        for name in names
+    ),
 ]
 
 
@@ -204,6 +235,28 @@ def test_a_mistake_is_answered_by_one_line_and_status_2(
 ) -> None:
     assert line in refusal(*command)
     assert not list(tmp_path.glob("runs/*"))
+
+
+@pytest.mark.parametrize("field", ["num_slots", "name"])
+def test_a_saved_scenario_that_leaves_a_value_open_is_refused(
+    refusal: Refusal, tmp_path: Path, field: str
+) -> None:
+    (tmp_path / "sent" / "scenario").mkdir(parents=True)
+    content = f"ue_positions: [[1, 2]]\n{field}: ???\n"
+    (tmp_path / "sent" / "scenario" / "open.yaml").write_text(content)
+    line = refusal("train", f"--config-dir={tmp_path / 'sent'}", "scenario=open")
+    assert line == f"error: scenario.{field} = '???': expected a value\n"
+
+
+def test_going_on_into_the_runs_own_directory_is_refused_and_loses_nothing(
+    call: Call, refusal: Refusal, tmp_path: Path
+) -> None:
+    call("train", "hydra.run.dir=base", *SHORT)
+    before = sorted((tmp_path / "base").rglob("*"))
+    accepted = "expected nothing beside it but device, threads and logger"
+    line = refusal("train", "resume=base", "hydra.run.dir=base")
+    assert line == f"error: resume = 'base': {accepted}, not hydra.run.dir\n"
+    assert sorted((tmp_path / "base").rglob("*")) == before
 
 
 def test_a_mistake_on_the_command_line_ends_the_process_with_status_2(tmp_path: Path) -> None:

@@ -97,6 +97,7 @@ def test_what_is_no_python_file_is_refused(tmp_path: Path, name: str) -> None:
         ),
         ("numbers = (\n", r"own.py: SyntaxError: '\(' was never closed \(own.py, line 1\)"),
         ("raise SystemExit(3)\n", "own.py, line 1: SystemExit: 3"),
+        ("raise KeyboardInterrupt\n", "own.py, line 1: KeyboardInterrupt:"),
     ],
 )
 def test_a_file_that_fails_is_named_with_the_line_and_the_reason(

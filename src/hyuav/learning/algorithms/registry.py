@@ -79,7 +79,7 @@ def run_own_files(paths: str) -> None:
         sys.modules[spec.name] = module  # where dataclasses and pickle look for it
         try:
             spec.loader.exec_module(module)
-        except (Exception, SystemExit) as error:
+        except BaseException as error:  # whichever the file raises
             del sys.modules[spec.name]
             accepted = f"a Python file that runs ({_failure(error, path)})"
             raise InputError(rejection(OWN_FILES, path, accepted)) from error
