@@ -22,6 +22,7 @@ from hyuav.benchmark.tables import print_tables
 from hyuav.configuration import Config, recipe, section
 from hyuav.recording import cores
 from hyuav.runs import named_scenario, require_writable
+from hyuav.terminal import print_line
 
 
 @recipe(
@@ -46,7 +47,7 @@ def main(config: Config, directory: Path) -> None:
         results.save(directory)  # so that a part that fails later takes none with it
     print_tables(results, console)
     draw(results, directory / "figures")
-    console.print(f"benchmark: {directory}", soft_wrap=True)
+    print_line(f"benchmark: {directory}", console)
 
 
 if __name__ == "__main__":

@@ -22,9 +22,11 @@ from hyuav.comparison.plan import Compare, require_libraries
 from hyuav.comparison.tables import print_tables
 from hyuav.comparison.work import work_off
 from hyuav.configuration import Config, recipe, same_call, section, telling_how_to_go_on
+from hyuav.errors import harmless
 from hyuav.evaluation import EvaluationParameters
 from hyuav.learning.training import TrainingParameters
 from hyuav.report.page import write_comparison_report
+from hyuav.terminal import print_line
 from hyuav.tracking import LoggerParameters, log_comparison
 
 
@@ -61,10 +63,10 @@ def compare(config: Config, directory: Path) -> None:
         logger = LoggerParameters.from_dict(config["logger"])
         report = write_comparison_report(directory)
         log_comparison(directory, summary, config, logger, console)
-        console.print(f"its report: {report.name}")
-    console.print(f"comparison: {directory}", soft_wrap=True)
+        print_line(f"its report: {report.name}", console)
+    print_line(f"comparison: {directory}", console)
     for name, reason in failures.items():
-        print(f"failed: {name}: {reason}", file=sys.stderr)
+        print(harmless(f"failed: {name}: {reason}"), file=sys.stderr)
     if failures:
         sys.exit(1)
 

@@ -17,6 +17,7 @@ from hyuav.errors import InputError
 from hyuav.figures.gallery import FIGURES, draw
 from hyuav.parameters import Parameters, choice, one_or_more, optional, parameter, text
 from hyuav.runs import RunDirectory, require_writable
+from hyuav.terminal import print_line
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ def main(config: Config, _: Path) -> None:
     require_writable("run", run.figures)
     console = Console()
     draw(run, options.figures, console)
-    console.print(f"figures: {run.figures}", soft_wrap=True)
+    print_line(f"figures: {run.figures}", console)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from hyuav.figures import save_flight_map
 from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text, thread_count
 from hyuav.report.page import write_run_report
 from hyuav.runs import RunDirectory, require_writable
+from hyuav.terminal import print_line
 from hyuav.tracking import EvaluationLoggerParameters, log_evaluation
 
 
@@ -75,8 +76,8 @@ def main(config: Config, _: Path) -> None:
     print_results(evaluation, console)
     report = write_run_report(output)
     log_evaluation(output, evaluation, runs, logger, console)
-    console.print(f"evaluation: {output}", soft_wrap=True)
-    console.print(f"its report: {report.name}")
+    print_line(f"evaluation: {output}", console)
+    print_line(f"its report: {report.name}", console)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from hyuav.configuration import Config, recipe, section
 from hyuav.errors import InputError
 from hyuav.parameters import Parameters, one_or_more, optional, parameter, text, thread_count
 from hyuav.report.page import write_report
+from hyuav.terminal import print_line
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ def main(config: Config, _: Path) -> None:
     torch.set_num_threads(options.threads)
     console = Console()
     for directory in options.run:
-        console.print(f"report: {write_report(directory)}", soft_wrap=True, markup=False)
+        print_line(f"report: {write_report(directory)}", console)
 
 
 if __name__ == "__main__":

@@ -51,6 +51,7 @@ from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.scenario import PRESETS, Scenario
 from hyuav.schemes.optimum import require_resolution
 from hyuav.system import SCHEMES
+from hyuav.terminal import print_line
 from hyuav.tracking import LoggerParameters, log_evaluation
 
 
@@ -136,9 +137,9 @@ def reproduce(config: Config, directory: Path) -> None:
     log_evaluation(run.path, evaluations[0], [run, paper_run], work.logger, console)
     for evaluation in evaluations:
         print_results(evaluation, console)
-    console.print(f"figures: {run.figures}", soft_wrap=True)
+    print_line(f"figures: {run.figures}", console)
     for report in reports:
-        console.print(f"report: {report}", soft_wrap=True)
+        print_line(f"report: {report}", console)
 
 
 @dataclass(frozen=True)

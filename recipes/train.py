@@ -40,6 +40,7 @@ from hyuav.parameters import (
 from hyuav.report.page import write_run_report
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.system import SCHEMES
+from hyuav.terminal import print_line
 from hyuav.tracking import LoggerParameters
 
 
@@ -127,9 +128,9 @@ def tell(run: RunDirectory, console: Console) -> None:
     """Print what a run's learners have reached, and where it is."""
     best = run.metrics().groupby("learner")["best_evaluation"].last()
     returns = ", ".join(f"{value:.2f}" for value in best)
-    console.print(f"best noise-free accumulated reward (bps/Hz): {returns}", soft_wrap=True)
-    console.print(f"run: {run.path}", soft_wrap=True)
-    console.print(f"its report: {write_run_report(run.path).name}")
+    print_line(f"best noise-free accumulated reward (bps/Hz): {returns}", console)
+    print_line(f"run: {run.path}", console)
+    print_line(f"its report: {write_run_report(run.path).name}", console)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import re
 import pytest
 from rich.console import Console
 
-from hyuav.terminal import TrainingProgress, print_table, results_table
+from hyuav.terminal import TrainingProgress, print_line, print_table, results_table
 
 
 def test_rows_are_named_on_the_left_and_numbers_aligned_on_the_right() -> None:
@@ -44,6 +44,26 @@ def test_a_table_that_is_piped_is_never_cut() -> None:
     assert [line.rstrip() for line in narrow.splitlines()] == [
         line.rstrip() for line in wide.splitlines()
     ]
+
+
+HOSTILE = "[/][red]a  b\x1b[2J\x1b]0;c\x07\u202e"
+SHOWN = "[/][red]a  b?[2J?]0;c??"
+
+
+@pytest.mark.parametrize("width", [20, 200])
+@pytest.mark.parametrize("terminal", [True, False])
+def test_names_of_others_are_text_that_no_terminal_obeys(width: int, *, terminal: bool) -> None:
+    console = Console(file=io.StringIO(), width=width, force_terminal=terminal, color_system=None)
+    table = results_table(HOSTILE, HOSTILE, HOSTILE)
+    table.add_row(HOSTILE, HOSTILE)
+    print_table(table, console)
+    print_line(HOSTILE, console)
+    assert isinstance(console.file, io.StringIO)
+    shown = re.sub(r"\x1b\[\d*m", "", console.file.getvalue())
+    assert shown.endswith(f"{SHOWN}\n")
+    assert all(line.isprintable() for line in shown.splitlines())
+    if width == 200:
+        assert shown.count(SHOWN) == 6
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])

@@ -25,7 +25,15 @@ from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
 
 from hyuav.configuration_files import read_files_as_data
-from hyuav.errors import Halted, InputError, Interrupted, one_line, rejection, require_choice
+from hyuav.errors import (
+    Halted,
+    InputError,
+    Interrupted,
+    harmless,
+    one_line,
+    rejection,
+    require_choice,
+)
 from hyuav.interruption import interrupted_by_sigterm
 from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.parameters import Parameters, mapping, refuse_unknown
@@ -135,10 +143,10 @@ def recipe(
                     raise
                 _refuse(explain(error))
             except KeyboardInterrupt as error:
-                print(str(error) or "interrupted", file=sys.stderr)
+                print(harmless(str(error)) or "interrupted", file=sys.stderr)
                 sys.exit(128 + (error.signal if isinstance(error, Interrupted) else signal.SIGINT))
             except Halted as error:
-                print(f"error: {error}", file=sys.stderr)
+                print(f"error: {harmless(str(error))}", file=sys.stderr)
                 sys.exit(1)
 
         return command
@@ -274,7 +282,7 @@ def explain(error: Exception) -> str:
 
 
 def _refuse(line: str) -> NoReturn:
-    print(f"error: {line}", file=sys.stderr)
+    print(f"error: {harmless(line)}", file=sys.stderr)
     sys.exit(2)
 
 

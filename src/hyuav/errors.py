@@ -45,9 +45,14 @@ class Halted(Exception):  # noqa: N818 - nothing was wrong with what was asked f
         self.resumable = resumable
 
 
+def harmless(text: str) -> str:
+    """Text of unknown origin without characters that a terminal would obey, line breaks too."""
+    return "".join(own if own.isprintable() else "?" for own in text)
+
+
 def one_line(text: str) -> str:
-    """Text of unknown origin on one line, without characters that a terminal would obey."""
-    return "".join(own if own.isprintable() else "?" for own in " ".join(text.split()))
+    """The same on one line, its words a blank apart."""
+    return harmless(" ".join(text.split()))
 
 
 def brief(value: object) -> str:

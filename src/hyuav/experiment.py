@@ -9,7 +9,7 @@ import torch
 from rich.console import Console
 from torch import Tensor
 
-from hyuav.errors import Halted, InputError, rejection
+from hyuav.errors import Halted, InputError, harmless, rejection
 from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
 from hyuav.interruption import Interruption
 from hyuav.learning.algorithms import AlgorithmParameters
@@ -22,7 +22,7 @@ from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
 from hyuav.schemes.linear import ConstantVelocity, ja_lt, re_lt
 from hyuav.schemes.optimum import FlightPolicy, solve
-from hyuav.terminal import print_table, results_table
+from hyuav.terminal import print_line, print_table, results_table
 from hyuav.tracking import LoggerParameters, Tracker
 from hyuav.tracking.checkpoints import Reported, first_checkpoint, restore
 
@@ -338,7 +338,7 @@ def reference_policies(
         try:
             policies[name] = [Policy(scheme(scenario))]
         except InputError as error:
-            console.print(f"{LABELS[name]} is left out: {error}")
+            print_line(f"{LABELS[name]} is left out: {error}", console)
     for rule, optimum in solve(scenario, resolution=resolution).items():
         policies[OPTIMA[rule]] = [Policy(FlightPolicy(optimum.path, scenario))]
     return policies
@@ -348,8 +348,8 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
     """Print the evaluation as a table that fits 80 columns."""
     summary = evaluation.summary
     title = (
-        f"{summary['scenario']}, T = {summary['num_slots']}: mean of {summary['episodes']} "
-        "episodes on the same fading, 95 % interval"
+        f"{harmless(summary['scenario'])}, T = {summary['num_slots']}: mean of "
+        f"{summary['episodes']} episodes on the same fading, 95 % interval"
     )
     table = results_table(
         title,

@@ -1,7 +1,7 @@
 """Tables and progress for the terminal, in one style; piped, they are plain and quiet."""
 
 from collections.abc import Sequence
-from typing import Self
+from typing import Any, Self
 
 from rich import box
 from rich.console import Console
@@ -19,6 +19,8 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
+from hyuav.errors import harmless
+
 WIDE = 80
 """Columns from which on a line of progress has room for everything."""
 
@@ -26,25 +28,48 @@ RETURNS_SHOWN = 3
 """Learners whose return is shown; of more, the mean."""
 
 
-def results_table(title: str, first: str, *headings: str) -> Table:
-    """A table without rows that wastes no columns.
+class LiteralTable(Table):
+    """A table that shows what its rows hold as it is, not as markup."""
+
+    def add_row(self, *cells: object, **options: Any) -> None:
+        """Add a row of texts or numbers."""
+        super().add_row(*(_literal(str(cell)) for cell in cells), **options)
+
+
+def results_table(title: str, first: str, *headings: str) -> LiteralTable:
+    """A table without rows that wastes no columns, and takes nothing for markup.
 
     Args:
         title: above it.
         first: heading of the first column, which names the rows.
         headings: of the columns of numbers.
     """
-    table = Table(
-        title=title,
+    table = LiteralTable(
+        title=_literal(title, "table.title"),
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
         collapse_padding=True,
     )
-    table.add_column(first, no_wrap=True)
+    table.add_column(_literal(first), no_wrap=True)
     for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column(_literal(heading), justify="right", no_wrap=True)
     return table
+
+
+def _literal(text: str, style: str = "") -> Text:
+    """Text that may have several lines."""
+    return Text("\n".join(map(harmless, text.split("\n"))), style)
+
+
+def print_line(text: str, console: Console) -> None:
+    """Print a line as it is, which may name what others named: nothing in it is obeyed.
+
+    Args:
+        text: of the line.
+        console: to print on. A line that is too long for it is left to the terminal to wrap.
+    """
+    console.print(Text(harmless(text)), soft_wrap=True)
 
 
 def print_table(table: Table, console: Console) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from omegaconf import OmegaConf
 
 from hyuav import Scenario
 from hyuav.learning.algorithms import DDPG
@@ -17,6 +18,7 @@ from recipe_calls import TINY, Call, Refusal
 NAMES = "ddpg, ddpg_robust, sac, sac_robust, td3, td3_robust"
 RECIPES = Path(__file__).parents[2] / "recipes"
 SHORT = (*TINY, "scenario.num_slots=10")
+FEW = ("evaluation.episodes=4", "evaluation.resolution=10")
 
 
 def test_training_keeps_a_run(call: Call, tmp_path: Path) -> None:
@@ -163,6 +165,35 @@ def test_a_straight_flight_too_fast_for_the_horizon_is_left_out_and_named(
     summary = json.loads((tmp_path / "short" / "evaluation.json").read_text())
     assert "ja_lt" not in summary["schemes"]
     assert "Ja-LT is left out" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["[/]", "[red]a  b"])
+def test_a_path_is_printed_as_it_is(
+    call: Call, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    call("train", f'hydra.run.dir="{name}"', *SHORT)
+    assert f"/{name}\n" in capsys.readouterr().out
+    call("evaluate", f'run="{name}"', *FEW)
+    assert f"evaluation: {name}\n" in capsys.readouterr().out
+    call("draw", f'run="{name}"', "figures=learning_curves")
+    assert f"figures: {name}/figures\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"), [("[/]", "[/]"), ("\x1b[2J\x1b]0;hacked\n", "?[2J?]0;hacked?")]
+)
+def test_a_scenarios_name_is_printed_as_text_that_no_terminal_obeys(
+    call: Call, capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, shown: str
+) -> None:
+    call("train", "hydra.run.dir=run", *SHORT)
+    capsys.readouterr()
+    config = tmp_path / "run" / "config.yaml"
+    OmegaConf.update(content := OmegaConf.load(config), "scenario.name", name)
+    OmegaConf.save(content, config)
+    call("evaluate", "run=run", *FEW)
+    printed = capsys.readouterr().out
+    assert printed.strip().startswith(f"{shown}, T = 10: mean of 4 episodes")
+    assert all(line.isprintable() for line in printed.splitlines())
 
 
 NAMED = ("train", "compare", "evaluate", "reproduce", "report", "draw", "dashboard", "benchmark")

@@ -9,7 +9,7 @@ from rich.table import Table
 from hyuav.benchmark.arithmetic import update_flops
 from hyuav.benchmark.results import Results
 from hyuav.benchmark.work import Work
-from hyuav.terminal import results_table
+from hyuav.terminal import print_line, results_table
 
 LABELS = {
     "hyuav": "HyUAV",
@@ -43,7 +43,8 @@ def label(row: "pd.Series[Any]") -> str:
 def print_tables(results: Results, console: Console) -> None:
     """Print a table for each part that was measured."""
     machine, summary = results.machine, results.summary()
-    console.print(f"{machine['processor']}, {machine['cores']} cores, GPU: {machine['gpu']}")
+    cores = f"{machine['cores']} cores"
+    print_line(f"{machine['processor']}, {cores}, GPU: {machine['gpu']}", console)
     numpy = summary[summary["entry"] == "numpy"]["median"]
     for part, rows in summary.groupby("part", sort=False):
         match part:

@@ -11,8 +11,9 @@ from rich.table import Table
 from hyuav.comparison.directory import Summary
 from hyuav.comparison.plan import PEER
 from hyuav.comparison.statistics import NEAR_OPTIMAL
+from hyuav.errors import harmless
 from hyuav.metrics import finite_numbers
-from hyuav.terminal import print_table, results_table
+from hyuav.terminal import print_line, print_table, results_table
 
 LABEL_WIDTH = 14
 """Of the column of the algorithms; longer names go on in the next line."""
@@ -62,14 +63,15 @@ def print_tables(summary: Summary, threshold: float, console: Console) -> None:
     for (scenario, num_slots), cells in summary.cells.groupby(
         ["scenario", "num_slots"], sort=False
     ):
-        print_table(_cells(f"{scenario}, T = {num_slots}", cells, threshold), console)
+        name = harmless(f"{scenario}, T = {num_slots}")
+        print_table(_cells(name, cells, threshold), console)
     print_table(_algorithms("All cells", summary.algorithms, threshold), console)
     if len(summary.layouts) and summary.cells["scenario"].nunique() > 1:
         print_table(_algorithms("Random layouts", summary.layouts, threshold), console)
     if len(summary.improvements):
         print_table(_improvements(summary.improvements), console)
     for line in stopped(summary.results):
-        console.print(line, soft_wrap=True, markup=False, highlight=False)
+        print_line(line, console)
 
 
 def _table(title: str, *headings: str) -> Table:

@@ -34,6 +34,7 @@ from hyuav.figures.over_time import (
 from hyuav.figures.style import COMPARED, save_figure, save_tables
 from hyuav.runs import RunDirectory
 from hyuav.scenario import Scenario
+from hyuav.terminal import print_line
 
 AS_IN_PAPER, HORIZONS = "as_in_paper", "horizons"
 """Directories within a main job's run: the paper's own algorithm, and other horizons."""
@@ -227,6 +228,4 @@ def draw(run: RunDirectory, names: Sequence[str] | None, console: Console) -> No
             except InputError as error:
                 if names is not None and each is run:
                     raise InputError(f"figure {name}: {error}") from None
-                console.print(
-                    f"{each.path.name}: figure {name} is left out: {error}", soft_wrap=True
-                )
+                print_line(f"{each.path.name}: figure {name} is left out: {error}", console)

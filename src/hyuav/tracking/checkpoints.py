@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from hyuav.errors import InputError
+from hyuav.errors import InputError, harmless
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from hyuav.learning.training import Training
 from hyuav.metrics_file import MetricsPosition, undamaged_metrics
@@ -105,5 +105,5 @@ def _take(found: _Found, run: RunDirectory, training: Training, reasons: list[st
     if reasons:
         reasons.append(f"going on after episode {training.episode}")
     for reason in reasons:
-        print(reason, file=sys.stderr)
+        print(harmless(reason), file=sys.stderr)
     return found.reported

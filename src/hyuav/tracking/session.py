@@ -18,7 +18,8 @@ import wandb
 from rich.console import Console
 
 from hyuav.durable import write_durably
-from hyuav.errors import InputError
+from hyuav.errors import InputError, harmless
+from hyuav.terminal import print_line
 from hyuav.tracking.parameters import LoggerParameters
 
 MEMORY_FILE = "wandb.json"
@@ -81,7 +82,7 @@ class Session:
             hint = f"W&B, offline: wandb sync {path} (in the terminal: wandb leet {path})"
         else:
             hint = f"W&B: {run.url}"
-        self._console.print(hint, soft_wrap=True, markup=False, highlight=False)
+        print_line(hint, self._console)
 
     @property
     def id(self) -> str | None:
@@ -287,4 +288,4 @@ def _reason(error: Exception) -> str:
 
 
 def _say(line: str) -> None:
-    print(f"W&B: {line}", file=sys.stderr)
+    print(f"W&B: {harmless(line)}", file=sys.stderr)
