@@ -4,18 +4,25 @@ import contextlib
 import importlib.util
 import os
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 from unittest import mock
 
-from hyuav.errors import InputError, rejection
+from hyuav.errors import InputError, one_line, rejection
 
 LOCAL = "local"
 """The address of a Ray that is started for the work and ends with it."""
 
+AUTO = "auto"
+"""The address of the Ray that runs on this machine."""
+
 OBJECT_STORE_BYTES = 100 * 2**20
 """Of a Ray of our own. What passes between processes is small: results lie in files."""
+
+SECONDS_TO_ANSWER = 5.0
+"""Within which the machine at an address must answer; Ray itself would wait for minutes."""
 
 STARTS = 3
 """How often a Ray of our own is started; on a busy machine the first may come up too late."""
@@ -44,7 +51,7 @@ def connected(address: str, workers: int, *, prints: bool) -> Iterator[None]:
     """Be connected to Ray.
 
     Args:
-        address: :data:`LOCAL`, "auto" for the one that runs on this machine, or HOST:PORT.
+        address: :data:`LOCAL`, :data:`AUTO` or HOST:PORT.
         workers: of a local one, which work at the same time.
         prints: whether what the workers print is printed here.
 
@@ -52,6 +59,8 @@ def connected(address: str, workers: int, *, prints: bool) -> Iterator[None]:
         InputError: Ray cannot be imported, or there is none at the address.
     """
     require_ray()
+    if address not in (LOCAL, AUTO):
+        _require_answer(address)
     for name, value in _ENVIRONMENT.items():
         os.environ.setdefault(name, value)
     import ray  # reads the environment
@@ -87,6 +96,20 @@ def _loopback_alone() -> Iterator[None]:
         yield
 
 
+def _require_answer(address: str) -> None:
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    try:
+        socket.create_connection((host.strip("[]"), port), SECONDS_TO_ANSWER).close()
+    except (OSError, ValueError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise _refusal(address, reason) from None
+
+
+def _refusal(address: str, reason: str) -> InputError:
+    accepted = f"{LOCAL}, {AUTO} or HOST:PORT of a Ray that runs ({one_line(reason)[:200]})"
+    return InputError(rejection("address", address, accepted))
+
+
 def _connect(address: str, options: dict[str, Any]) -> None:
     import ray
 
@@ -97,9 +120,7 @@ def _connect(address: str, options: dict[str, Any]) -> None:
             ray.shutdown()
             if address == LOCAL and attempt < STARTS:
                 continue
-            reason = " ".join(str(error).split())[:200]
-            accepted = f"{LOCAL}, auto or HOST:PORT of a Ray that runs ({reason})"
-            raise InputError(rejection("address", address, accepted)) from None
+            raise _refusal(address, str(error)) from None
         return
 
 

@@ -56,6 +56,13 @@ def test_the_launcher_of_ray_is_asked_for_with_its_extra(
     assert refusal("train", "-m", "seed=0,1", "hydra/launcher=ray", *SHORT) == line
 
 
+def test_the_launcher_of_ray_does_not_wait_where_nobody_answers(refusal: Refusal) -> None:
+    pytest.importorskip("ray")
+    launcher = ("hydra/launcher=ray", "hydra.launcher.address=127.0.0.1:1")
+    line = refusal("train", "-m", "seed=0,1", *launcher, *SHORT)
+    assert line.startswith("error: address = '127.0.0.1:1': expected local, auto or HOST:PORT")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("library", "launcher"),
