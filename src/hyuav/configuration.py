@@ -3,6 +3,7 @@
 from hyuav_start import loaded
 
 import argparse
+import contextlib
 import dataclasses
 import logging
 import os
@@ -77,7 +78,7 @@ def recipe(
 
     The function is given the configuration in plain values, from which :func:`section` reads the
     typed records, and the run's directory. Mistakes of the user end the command with one line
-    and exit status 2.
+    and exit status 2, a machine that fails, such as by a full disk, with one line and 1.
 
     Args:
         name: of the recipe.
@@ -115,13 +116,16 @@ def recipe(
             nonlocal composed
             composed = True
             directory = Path(HydraConfig.get().runtime.output_dir)
+            hint = "" if NOW in run_directory else ", and the same command goes on"
             try:
-                function(_plain(config, names, groups, sections), directory)
-            except InputError as error:
+                with _halting(hint):
+                    function(_plain(config, names, groups, sections), directory)
+            except (InputError, Halted) as error:
                 remove_if_empty(directory)
                 if HydraConfig.get().mode is RunMode.MULTIRUN:
                     raise  # the other jobs go on, and Hydra says which one it was
-                _refuse(str(error))  # here, before Hydra adds lines of its own
+                status = 1 if isinstance(error, Halted) else 2
+                _end(str(error), status)  # here, before Hydra adds lines of its own
 
         # Or Hydra would take this package's folders for groups: hyuav/figures for ``figures=...``.
         run.__module__ = "__main__"
@@ -141,13 +145,12 @@ def recipe(
             except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
                 if composed and not isinstance(error, InputError):
                     raise
-                _refuse(explain(error))
+                _end(explain(error), 2)
             except KeyboardInterrupt as error:
                 print(harmless(str(error)) or "interrupted", file=sys.stderr)
                 sys.exit(128 + (error.signal if isinstance(error, Interrupted) else signal.SIGINT))
             except Halted as error:
-                print(f"error: {harmless(str(error))}", file=sys.stderr)
-                sys.exit(1)
+                _end(str(error), 1)
 
         return command
 
@@ -182,7 +185,8 @@ def _plain(
 def remove_if_empty(directory: Path) -> None:
     """Remove a directory that Hydra made and nothing was kept in."""
     if directory.is_dir() and not any(directory.iterdir()) and directory.resolve() != Path.cwd():
-        directory.rmdir()
+        with contextlib.suppress(OSError):  # on a disk that has become read-only
+            directory.rmdir()
 
 
 def given() -> set[str]:
@@ -206,11 +210,11 @@ def telling_how_to_go_on(
 
     Raises:
         Interrupted: in place of any other interruption, with the command.
-        Halted: with the command where going on is possible.
+        Halted: with the command where going on is possible; in place of an OSError too.
     """
     hint = f"go on with: {shlex.join([sys.orig_argv[0], sys.argv[0], *overrides])}"
     try:
-        with interrupted_by_sigterm():
+        with interrupted_by_sigterm(), _halting(""):
             yield
     except KeyboardInterrupt as error:
         if not possible():
@@ -218,7 +222,7 @@ def telling_how_to_go_on(
         number = error.signal if isinstance(error, Interrupted) else signal.SIGINT
         raise Interrupted(f"{str(error) or 'interrupted'}; {hint}", number) from None
     except Halted as error:
-        if not error.resumable:
+        if not error.resumable or not possible():
             raise
         raise Halted(f"{error}; {hint}") from None
 
@@ -281,9 +285,20 @@ def explain(error: Exception) -> str:
     return one_line(text)
 
 
-def _refuse(line: str) -> NoReturn:
+@contextmanager
+def _halting(hint: str) -> Iterator[None]:
+    """Halt where the system refuses to read or write, with the file, why, and a hint behind."""
+    try:
+        yield
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        line = f"halted: {where}{error.strerror or error}; what was there before is kept"
+        raise Halted(f"{one_line(line)}{hint}") from error
+
+
+def _end(line: str, status: int) -> NoReturn:
     print(f"error: {harmless(line)}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(status)
 
 
 def _message(check: Callable[[], None]) -> str:

@@ -64,7 +64,11 @@ def create_durably(path: Path, content: bytes) -> None:
 
 @contextmanager
 def _written_beside(path: Path, content: bytes | memoryview) -> Iterator[Path]:
-    """A file of this content beside ``path``, to be given that name; it is removed otherwise."""
+    """A file of this content beside ``path``, to be given that name; it is removed otherwise.
+
+    Raises:
+        OSError: in which the file is called ``path``.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.partial")
     try:
@@ -72,10 +76,22 @@ def _written_beside(path: Path, content: bytes | memoryview) -> Iterator[Path]:
             write_all(file, content)
             sync(file)
         yield partial
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
     _sync_directory(path.parent)
+
+
+def rename_durably(directory: Path, to: Path) -> None:
+    """Rename a directory whose files are synced; its name outlasts a loss of power.
+
+    Raises:
+        OSError: it cannot be renamed.
+    """
+    directory.rename(to)
+    _sync_directory(to.parent)
 
 
 def _sync_directory(directory: Path) -> None:

@@ -14,6 +14,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
+from hyuav.durable import write_durably
 from hyuav.envs.transforms import make_env
 from hyuav.errors import InputError, rejection, require_choice
 from hyuav.parameters import Parameters, count, number, parameter
@@ -96,11 +97,14 @@ class Evaluation:
     """A few episodes of each scheme, a row per slot."""
 
     def save(self, directory: Path) -> None:
-        """Write ``evaluation.json`` and ``flights.parquet`` into ``directory``."""
-        directory.mkdir(parents=True, exist_ok=True)
+        """Write ``evaluation.json`` and ``flights.parquet`` into ``directory``.
+
+        Raises:
+            OSError: one of them cannot be written; then an earlier one is still there.
+        """
         text = json.dumps(self.summary, indent=2)
-        (directory / EVALUATION_FILE).write_text(f"{text}\n", encoding="utf-8")
-        self.flights.to_parquet(directory / FLIGHTS_FILE)
+        write_durably(directory / FLIGHTS_FILE, self.flights.to_parquet())
+        write_durably(directory / EVALUATION_FILE, f"{text}\n".encode())
 
 
 def evaluate(

@@ -10,6 +10,7 @@ import pandas as pd
 from hyuav.benchmark.arithmetic import update_flops
 from hyuav.benchmark.measure import Row
 from hyuav.benchmark.work import Work
+from hyuav.durable import write_durably
 
 IDENTITY = ["part", "entry", "device", "learners", "helpers", "num_ues", "num_slots", "threads"]
 """Columns in which measurements of the same thing agree; they differ in the round."""
@@ -78,14 +79,14 @@ class Results:
 
     def save(self, directory: Path) -> None:
         """Write ``benchmark.json`` and, measurement by measurement, ``benchmark.parquet``."""
-        directory.mkdir(parents=True, exist_ok=True)
-        self.measurements.to_parquet(directory / "benchmark.parquet")
+        write_durably(directory / "benchmark.parquet", self.measurements.to_parquet())
         content = {
             "machine": self.machine,
             "matrix_rates": self.matrix_rates,
             "summary": json.loads(self.summary().to_json(orient="records")),
         }
-        (directory / "benchmark.json").write_text(json.dumps(content, indent=2) + "\n")
+        text = json.dumps(content, indent=2)
+        write_durably(directory / "benchmark.json", f"{text}\n".encode())
 
 
 def _keep_best_threads(summary: pd.DataFrame) -> pd.DataFrame:

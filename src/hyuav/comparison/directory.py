@@ -1,5 +1,6 @@
 """A comparison's directory: what was asked for, what is done, and what came of it."""
 
+import contextlib
 import dataclasses
 import json
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from hyuav.comparison.statistics import (
     summarize_cells,
 )
 from hyuav.configuration import Config
+from hyuav.durable import create_durably, write_durably
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EvaluationParameters
 from hyuav.learning.algorithms import ALGORITHMS
@@ -48,15 +50,19 @@ class Summary:
     improvements: pd.DataFrame
 
     def save(self, directory: Path) -> None:
-        """Write ``results``, ``curves`` and ``cells`` as Parquet, the rest as ``summary.json``."""
+        """Write ``results``, ``curves`` and ``cells`` as Parquet, the rest as ``summary.json``.
+
+        Raises:
+            OSError: one of them cannot be written; then an earlier one is still there.
+        """
         for name in ("results", "curves", "cells"):
-            getattr(self, name).to_parquet(directory / f"{name}.parquet")
+            write_durably(directory / f"{name}.parquet", getattr(self, name).to_parquet())
         content = {
             name: getattr(self, name).to_dict(orient="records")
             for name in ("algorithms", "layouts", "improvements")
         }
         text = json.dumps(content, indent=2)
-        (directory / "summary.json").write_text(f"{text}\n", encoding="utf-8")
+        write_durably(directory / "summary.json", f"{text}\n".encode())
 
 
 class ComparisonDirectory:
@@ -74,6 +80,7 @@ class ComparisonDirectory:
     Raises:
         InputError: an unacceptable parameter, another comparison in the directory, or a place
             that cannot be written to.
+        OSError: what was asked for cannot be kept, for want of space perhaps.
     """
 
     def __init__(self, path: Path, config: Config, options: Compare) -> None:
@@ -112,8 +119,8 @@ class ComparisonDirectory:
         request = {**config, "hyperparameters": hyperparameters}
         file = self.path / "config.yaml"
         require_writable("output", self.path)
-        if not file.exists():
-            file.write_text(OmegaConf.to_yaml(request), encoding="utf-8")
+        with contextlib.suppress(FileExistsError):
+            create_durably(file, OmegaConf.to_yaml(request).encode())
             return
         try:
             asked, kept = _entries(request), self._unsaid | _entries(read_yaml(file))

@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 import torch
 
+from hyuav.durable import write_durably
 from hyuav.evaluation import Policy
 from hyuav.scenario import Scenario
 from hyuav.schemes.optimum import FlightPolicy, solve_horizons
@@ -44,10 +45,7 @@ class Optima:
             for scheme, optima in found.items()
             for num_slots, optimum in optima.items()
         ]
-        self.file.parent.mkdir(parents=True, exist_ok=True)
-        partial = self.file.with_suffix(".partial")
-        pd.concat(flights, ignore_index=True).to_parquet(partial)
-        partial.replace(self.file)
+        write_durably(self.file, pd.concat(flights, ignore_index=True).to_parquet())
 
     def policy(self, scheme: str, num_slots: int) -> Policy:
         """The way to fly the best flight of a scheme over a horizon."""

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.plan import PEER, training_episodes
+from hyuav.durable import rename_durably, write_durably
 from hyuav.errors import BusyError, Halted, InputError, rejection
 from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
 from hyuav.experiment import LEARNED, learned_policies, resume, train
@@ -77,9 +78,9 @@ class Shard:
             _train(self, partial)
             metrics, sum_rates = _reached(self, RunDirectory(partial))
         results, curves = tables(self, metrics, sum_rates)
-        results.to_parquet(partial / RESULTS_FILE)
-        curves.to_parquet(partial / CURVES_FILE)
-        partial.rename(self.path)
+        write_durably(partial / CURVES_FILE, curves.to_parquet())
+        write_durably(partial / RESULTS_FILE, results.to_parquet())
+        rename_durably(partial, self.path)
 
 
 def _clear(directory: Path) -> None:

@@ -1,5 +1,6 @@
 """A flight in motion: coverage, links and modes, slot by slot."""
 
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
+from hyuav.durable import write_durably
 from hyuav.envs.rendering import (
     UE_COLOR,
     draw_coverage,
@@ -48,21 +50,25 @@ def animate_flight(scenario: Scenario, slots: pd.DataFrame, file: Path) -> None:
         scenario: that is flown.
         slots: of one flight, a row per slot as in :attr:`Evaluation.flights`.
         file: to write.
+
+    Raises:
+        OSError: it cannot be written; then an earlier one is still there.
     """
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE), tempfile.TemporaryDirectory() as elsewhere:
         figure = Figure(figsize=INCHES)
         over_map = figure.add_axes((0.17, 0.395, 0.79, 0.79 * INCHES[0] / INCHES[1]))
         over_time = figure.add_axes((0.17, 0.21, 0.79, 0.09))
         _draw_legend(figure)
         writer = PillowWriter(fps=SLOTS_PER_SECOND)
-        with writer.saving(figure, str(file), DPI):
+        drawn = Path(elsewhere) / file.name  # Pillow tells the format by the name
+        with writer.saving(figure, str(drawn), DPI):
             for flown in (*range(len(slots) + 1), *[len(slots)] * SLOTS_HELD):
                 over_map.clear()
                 _draw_map(over_map, scenario, slots.iloc[:flown])
                 over_time.clear()
                 _draw_rates(over_time, slots, flown)
                 writer.grab_frame()
+        write_durably(file, drawn.read_bytes())
 
 
 def _draw_map(axes: Axes, scenario: Scenario, slots: pd.DataFrame) -> None:

@@ -1,5 +1,6 @@
 """What all figures have in common: sizes, fonts, each scheme's color and line, and their files."""
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import matplotlib as mpl
 import pandas as pd
 from matplotlib.figure import Figure
 
+from hyuav.durable import write_durably
 from hyuav.envs.rendering import OKABE_ITO
 
 COLUMN_WIDTH, PAGE_WIDTH = 3.5, 7.16
@@ -69,11 +71,15 @@ def save_figure(
         name: of the figure.
         tables: that it was drawn from: the one called "" becomes ``name.csv``, another
             ``name_KEY.csv``.
+
+    Raises:
+        OSError: a file cannot be written; then an earlier one is still there.
     """
-    directory.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):
         for suffix in ("png", "pdf"):
-            figure.savefig(directory / f"{name}.{suffix}")
+            drawn = io.BytesIO()
+            figure.savefig(drawn, format=suffix)
+            write_durably(directory / f"{name}.{suffix}", drawn.getbuffer())
     save_tables(directory, name, tables or {})
 
 
@@ -81,4 +87,5 @@ def save_tables(directory: Path, name: str, tables: Mapping[str, pd.DataFrame]) 
     """Write the tables of a figure, as :func:`save_figure` names them."""
     for key, table in tables.items():
         file = f"{name}_{key}.csv" if key else f"{name}.csv"
-        table.to_csv(directory / file, index=False, float_format="%.6g")
+        text = table.to_csv(index=False, float_format="%.6g")
+        write_durably(directory / file, text.encode())

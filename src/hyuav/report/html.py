@@ -13,6 +13,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from hyuav.durable import write_durably
+
 
 class Picture(NamedTuple):
     """A figure, or several of which the reader chooses one."""
@@ -56,10 +58,12 @@ def write_page(page: Page, path: Path) -> Path:
 
     Returns:
         the path.
+
+    Raises:
+        OSError: it cannot be written; then an earlier one is still there.
     """
-    partial = path.with_name(f".{path.name}.partial")
-    partial.write_bytes(render(page).encode("utf-8", errors="replace"))
-    return partial.replace(path)
+    write_durably(path, render(page).encode("utf-8", errors="replace"))
+    return path
 
 
 def render(page: Page) -> str:

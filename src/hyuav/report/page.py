@@ -8,7 +8,7 @@ from hyuav.report.comparison import comparison_page
 from hyuav.report.html import Page, write_page
 from hyuav.report.reading import readable_config
 from hyuav.report.run import run_page
-from hyuav.runs import REPORT_FILE
+from hyuav.runs import REPORT_FILE, require_writable
 
 
 def write_run_report(directory: str | Path) -> Path:
@@ -21,6 +21,7 @@ def write_run_report(directory: str | Path) -> Path:
 
     Raises:
         InputError: there is no such directory, or it cannot be written to.
+        OSError: the report cannot be written, for want of space perhaps.
     """
     return _write(directory, run_page)
 
@@ -34,6 +35,7 @@ def write_comparison_report(directory: str | Path) -> Path:
 
     Raises:
         InputError: there is no such directory, or it cannot be written to.
+        OSError: the report cannot be written, for want of space perhaps.
     """
     return _write(directory, comparison_page)
 
@@ -43,6 +45,7 @@ def write_report(directory: str | Path) -> Path:
 
     Raises:
         InputError: there is no such directory, or it cannot be written to.
+        OSError: the report cannot be written, for want of space perhaps.
     """
     path = Path(directory)
     compares = (path / "shards").is_dir() or "hyperparameters" in readable_config(path)
@@ -53,8 +56,5 @@ def _write(directory: str | Path, page: Callable[[Path], Page]) -> Path:
     path = Path(directory)
     if not path.is_dir():
         raise InputError(rejection("run", str(path), "an existing directory"))
-    try:
-        return write_page(page(path), path / REPORT_FILE)
-    except OSError as error:
-        accepted = f"a directory that can be written to ({error.strerror})"
-        raise InputError(rejection("run", str(path), accepted)) from None
+    require_writable("run", path)
+    return write_page(page(path), path / REPORT_FILE)
