@@ -2,11 +2,13 @@ import os
 import time
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from dashboard_runs import WriteRun, metrics_row
-from hyuav.dashboard.index import RUNNING_SECONDS, RunIndex
+from hyuav.dashboard.index import MOST_DRAWN, RUNNING_SECONDS, RunIndex
 from hyuav.errors import InputError
+from hyuav.metrics import parse_rows
 
 
 def test_a_run_is_listed_with_what_it_is_and_how_far_it_has_come(
@@ -50,6 +52,56 @@ def test_the_list_and_the_metrics_follow_a_file_that_grows(write: WriteRun, tmp_
     with path.open("a") as file:
         file.write(metrics_row(4) + "\n" + metrics_row(5)[:6])
     assert (index.entries()[0].episode, len(index.metrics("growing"))) == (4, 4)
+
+
+def test_as_many_runs_as_can_be_drawn_are_parsed_once(
+    write: WriteRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = [f"run_{number:02}" for number in range(MOST_DRAWN)]
+    for name in names:
+        write(name, 2)
+    parsed: list[bytes] = []
+
+    def parse(lines: bytes, columns: list[str]) -> pd.DataFrame:
+        parsed.append(lines)
+        return parse_rows(lines, columns)
+
+    monkeypatch.setattr("hyuav.dashboard.growing.parse_rows", parse)
+    index = RunIndex(tmp_path / "runs")
+    first = [index.metrics(name) for name in names]
+    assert len(parsed) == MOST_DRAWN
+    assert all(rows is index.metrics(name) for name, rows in zip(names, first, strict=True))
+    assert len(parsed) == MOST_DRAWN
+
+
+def test_the_training_of_a_comparison_has_one_name_before_and_after_its_end(
+    write: WriteRun, tmp_path: Path
+) -> None:
+    unfinished = write("compared/shards/ddpg_T10.partial", 3)
+    index = RunIndex(tmp_path / "runs")
+    (entry,) = index.entries()
+    assert entry.name == "compared/shards/ddpg_T10"
+    assert len(index.metrics(entry.name)) == 3
+    assert index.configuration(entry.name)["algorithm"]["name"] == "ddpg"
+    finished = unfinished.rename(unfinished.with_suffix(""))
+    assert len(index.metrics(entry.name)) == 3
+    assert [own.name for own in index.entries()] == [entry.name]
+    with (finished / "metrics.csv").open("a") as file:
+        file.write(metrics_row(4) + "\n")
+    assert len(index.metrics(entry.name)) == 4
+    write("compared/shards/ddpg_T10.partial", 1)  # a directory of each name: none is hidden
+    assert {own.name for own in index.entries()} == {entry.name, f"{entry.name}.partial"}
+    assert len(index.metrics(f"{entry.name}.partial")) == 1
+
+
+def test_evaluations_apart_from_a_run_are_found(write: WriteRun, tmp_path: Path) -> None:
+    job = write("job", 1)
+    for directory in (job, job / "horizons" / "T10", tmp_path / "runs" / "apart"):
+        directory.mkdir(parents=True, exist_ok=True)
+        (directory / "flights.parquet").write_bytes(b"flights")
+    index = RunIndex(tmp_path / "runs")
+    assert index.evaluations() == ["apart", "job/horizons/T10"]
+    assert [entry.name for entry in index.entries()] == ["job"]
 
 
 def test_the_newest_run_comes_first(write: WriteRun, tmp_path: Path) -> None:

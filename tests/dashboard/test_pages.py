@@ -1,6 +1,7 @@
 """The pages as Streamlit runs them, without a browser."""
 
 import dataclasses
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from dashboard_runs import SCENARIO, WriteRun
+from dashboard_runs import SCENARIO, WriteRun, metrics_row
 from hyuav.dashboard.draft import load, save
 
 
@@ -31,6 +32,17 @@ def _explorer(root: str) -> None:
     from hyuav.dashboard.index import RunIndex
 
     explorer_page.show(RunIndex(root))
+
+
+def _followed(root: str) -> None:
+    import streamlit as st
+
+    from hyuav.dashboard import runs_page
+    from hyuav.dashboard.index import RunIndex
+
+    if "index" not in st.session_state:
+        st.session_state["index"] = RunIndex(root)
+    runs_page.show(st.session_state["index"])
 
 
 PAGES = {"runs": _runs, "flights": _flights, "explorer": _explorer}
@@ -88,6 +100,36 @@ def test_the_newest_run_is_drawn_and_any_can_be_compared(write: WriteRun, tmp_pa
     assert set(page.dataframe[1].value["Run"]) == {"one", "two", "three"}
     widget(page, "multiselect", "Runs to draw").set_value(["two"]).run()
     assert set(page.dataframe[1].value["Run"]) == {"two"}
+    assert errors(page) == []
+
+
+def test_curves_are_computed_again_only_where_something_has_changed(
+    write: WriteRun, tmp_path: Path
+) -> None:
+    path = write("one", 6) / "metrics.csv"
+    page = opened(_followed, tmp_path / "runs")
+    first = page.session_state["shown"]
+    assert page.run().session_state["shown"] is first
+    with path.open("a") as file:
+        file.write(metrics_row(7) + "\n")
+    second = page.run().session_state["shown"]
+    assert [len(trace.x) for trace in second.figure.data] == [7]
+    page.radio(key="colors").set_value("run").run()
+    assert page.session_state["shown"].figure.data[0].line != second.figure.data[0].line
+    assert errors(page) == []
+
+
+def test_a_training_stays_drawn_when_its_comparison_renames_it(
+    write: WriteRun, tmp_path: Path
+) -> None:
+    write("other", 3)
+    unfinished = write("compared/shards/ddpg_T10.partial", 6)
+    page = opened(_runs, tmp_path / "runs")
+    widget(page, "multiselect", "Runs to draw").set_value(["compared/shards/ddpg_T10"]).run()
+    unfinished.rename(unfinished.with_suffix(""))
+    page.run()
+    assert widget(page, "multiselect", "Runs to draw").value == ["compared/shards/ddpg_T10"]
+    assert set(page.dataframe[1].value["Run"]) == {"compared/shards/ddpg_T10"}
     assert errors(page) == []
 
 
@@ -149,6 +191,20 @@ def test_the_flights_of_an_evaluation_and_of_a_checkpoint_are_played(trained: Pa
     page.selectbox(key="flown_source").set_value("of its best weights, flown now").run()
     page.selectbox(key="flown_learner").set_value(1).run()
     assert page.selectbox(key="flown_scheme").options == ["Re-OT"]
+    assert errors(page) == []
+
+
+def test_an_evaluation_that_is_kept_apart_is_played(runs: Path) -> None:
+    apart = runs / "tiny" / "horizons" / "T10"
+    apart.mkdir(parents=True)
+    for name in ("evaluation.json", "flights.parquet"):
+        shutil.copy(runs / "tiny" / name, apart)
+    page = opened(_flights, runs)
+    chosen = page.selectbox(key="flown_run")
+    assert chosen.options == ["tiny", "tiny/horizons/T10 (evaluation)"]
+    chosen.set_value("tiny/horizons/T10").run()
+    assert page.selectbox(key="flown_source").options == ["kept by its evaluation"]
+    assert "Optimum" in page.selectbox(key="flown_scheme").options
     assert errors(page) == []
 
 

@@ -15,7 +15,7 @@ import yaml
 
 from hyuav.dashboard.growing import GrowingMetrics, require_columns
 from hyuav.errors import InputError, rejection
-from hyuav.evaluation import EVALUATION_FILE, OPTIMA
+from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE, OPTIMA
 from hyuav.metrics import parse_rows
 from hyuav.parameters import YAML_LOADER, require_plain_yaml
 from hyuav.runs import RunDirectory
@@ -36,8 +36,11 @@ _LARGEST_CONFIG = 2**20
 _ROW_BYTES = 250
 """Of the longest rows of ``metrics.csv``."""
 
-_KEPT_METRICS = 24
-"""Tables of metrics that are kept in memory."""
+MOST_DRAWN = 40
+"""Runs in one figure, whose metrics are kept in memory."""
+
+_PARTIAL = ".partial"
+"""Behind the name of a comparison's training while it is not finished."""
 
 Stamp = tuple[int, ...]
 """Modification time in ns and size of each file from which an entry was made."""
@@ -48,7 +51,7 @@ class RunEntry:
     """What the list of runs shows of one."""
 
     name: str
-    """Of its directory, from the root."""
+    """Of its directory, from the root; what is only there until it is finished is left out."""
     scenario: str
     algorithm: str
     schemes: tuple[str, ...]
@@ -97,8 +100,8 @@ class RunIndex:
         """All runs, the last begun first."""
         with self._lock:
             found = {}
-            for directory in _run_directories(self.root, 0):
-                name = directory.relative_to(self.root).as_posix()
+            for directory, _ in _directories(self.root, {"metrics.csv"}):
+                name = self._name(directory)
                 try:
                     found[name] = self._entry(name, directory)
                 except OSError:  # removed meanwhile
@@ -107,6 +110,16 @@ class RunIndex:
         return sorted(
             (entry for _, entry in found.values()), key=lambda entry: (-entry.begun, entry.name)
         )
+
+    def evaluations(self) -> list[str]:
+        """The names of evaluations that are kept apart from any run, with flights to be played."""
+        found = _directories(self.root, {"metrics.csv", FLIGHTS_FILE})
+        return sorted(self._name(path) for path, files in found if files == {FLIGHTS_FILE})
+
+    def _name(self, directory: Path) -> str:
+        """The same while a training goes on and when its directory has got its final name."""
+        final = directory.with_suffix("") if directory.suffix == _PARTIAL else directory
+        return (directory if final.exists() else final).relative_to(self.root).as_posix()
 
     def _entry(self, name: str, directory: Path) -> tuple[Stamp, RunEntry]:
         files = directory / "config.yaml", directory / "metrics.csv"
@@ -130,6 +143,8 @@ class RunIndex:
         """
         path = self.root.joinpath(name, *parts)
         try:
+            if not self.root.joinpath(name).exists():
+                path = self.root.joinpath(f"{name}{_PARTIAL}", *parts)
             inside = path.resolve(strict=True).is_relative_to(self.root)
         except (OSError, ValueError):
             accepted = f"a run below {self.root} with {'/'.join(parts) or 'a directory'}"
@@ -206,27 +221,31 @@ class RunIndex:
         path = self.file(name, "metrics.csv")
         with self._lock:
             growing = self._metrics.setdefault(name, GrowingMetrics(path))
+            growing.path = path  # which changes when a comparison's training is finished
             self._metrics.move_to_end(name)
-            if len(self._metrics) > _KEPT_METRICS:
+            if len(self._metrics) > MOST_DRAWN:
                 self._metrics.popitem(last=False)
             return growing.read()
 
 
-def _run_directories(directory: Path, depth: int) -> Iterator[Path]:
-    """Directories with a ``metrics.csv``, without following symbolic links."""
+def _directories(
+    directory: Path, names: set[str], depth: int = 0
+) -> Iterator[tuple[Path, set[str]]]:
+    """Directories with some of the files, and which; no symbolic link is followed."""
     try:
         with os.scandir(directory) as listing:
             members = list(listing)
     except OSError:
         return
-    if any(m.name == "metrics.csv" and m.is_file(follow_symlinks=False) for m in members):
-        yield directory
+    files = {m.name for m in members if m.name in names and m.is_file(follow_symlinks=False)}
+    if files:
+        yield directory, files
     if depth == _DEEPEST:
         return
     for member in members:
         hidden = member.name.startswith(".") or member.name in _WITHOUT_RUNS
         if not hidden and member.is_dir(follow_symlinks=False):
-            yield from _run_directories(directory / member.name, depth + 1)
+            yield from _directories(directory / member.name, names, depth + 1)
 
 
 def _read_config(path: Path) -> Mapping[str, Any]:

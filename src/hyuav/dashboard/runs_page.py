@@ -2,13 +2,15 @@
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
+import plotly.graph_objects as go
 import streamlit as st
 
 from hyuav.dashboard.curves import X_AXES, Choice, axes_of, comparison
-from hyuav.dashboard.index import STATES, RunEntry, RunIndex
+from hyuav.dashboard.index import MOST_DRAWN, STATES, RunEntry, RunIndex
 from hyuav.dashboard.plain import plain, refusals
 from hyuav.dashboard.tables import differences, outcomes
 from hyuav.errors import InputError
@@ -21,9 +23,6 @@ KEPT = (
 
 SECONDS = 2.0
 """Between two looks at the files."""
-
-MOST_DRAWN = 40
-"""Runs in one figure."""
 
 _ROW, _TABLE = 35, 290
 """Heights in pixels."""
@@ -190,7 +189,7 @@ def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
         for name in metrics:
             with refusals():
                 optima[name] = index.optima(name)
-    figure = comparison(metrics, optima, choice)
+    figure = _figure(metrics, optima, choice)
     if not figure.data:
         st.info("No episode of this quantity is complete yet.")
         return
@@ -208,6 +207,40 @@ def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
             st.caption("Nothing but their names.")
         else:
             st.dataframe(table)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """The figure of the last renewal, and what it was made of."""
+
+    metrics: Mapping[str, pd.DataFrame]
+    optima: Mapping[str, Mapping[str, float]]
+    choice: Choice
+    figure: go.Figure
+
+    def shows(
+        self,
+        metrics: Mapping[str, pd.DataFrame],
+        optima: Mapping[str, Mapping[str, float]],
+        choice: Choice,
+    ) -> bool:
+        """Whether it was made of the same, where metrics without new rows are the same table."""
+        return (
+            (self.optima, self.choice) == (optima, choice)
+            and list(self.metrics) == list(metrics)
+            and all(rows is metrics[name] for name, rows in self.metrics.items())
+        )
+
+
+def _figure(
+    metrics: Mapping[str, pd.DataFrame], optima: Mapping[str, Mapping[str, float]], choice: Choice
+) -> go.Figure:
+    """The figure, made anew only where something has changed."""
+    shown: _Shown | None = st.session_state.get("shown")
+    if shown is None or not shown.shows(metrics, optima, choice):
+        shown = _Shown(metrics, optima, choice, comparison(metrics, optima, choice))
+        st.session_state["shown"] = shown
+    return shown.figure
 
 
 def _choice(metrics: Mapping[str, pd.DataFrame]) -> Choice:
