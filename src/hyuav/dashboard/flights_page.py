@@ -42,7 +42,9 @@ _LARGEST_FILE = 2**28
 def show(index: RunIndex) -> None:
     """The page."""
     st.header("Flights", anchor=False)
-    sources = {entry.name: _sources(index, entry.name) for entry in index.entries()}
+    evaluations = index.evaluations()
+    listed = [*(entry.name for entry in index.entries()), *evaluations]
+    sources = {name: _sources(index, name) for name in listed}
     names = [name for name, kinds in sources.items() if kinds]
     if not names:
         st.info(
@@ -55,7 +57,12 @@ def show(index: RunIndex) -> None:
             (name for name in names if KEPT_FLIGHTS in sources[name]), names[0]
         )
     first, second = st.columns(2)
-    run = first.selectbox("Run", names, key="flown_run")
+    run = first.selectbox(
+        "Run",
+        names,
+        format_func=lambda name: f"{name} (evaluation)" if name in evaluations else name,
+        key="flown_run",
+    )
     if st.session_state.get("flown_source") not in sources[run]:
         st.session_state["flown_source"] = sources[run][0]
     source = second.selectbox("Flights", sources[run], key="flown_source")
