@@ -1,7 +1,7 @@
 """The report of a run: what it learned and how its schemes fly."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,9 @@ import pandas as pd
 from hyuav.errors import InputError
 from hyuav.evaluation import LABELS, MODE_RULES, OPTIMA, EvaluationParameters, Policy, evaluate
 from hyuav.experiment import LEARNED, LEARNED_AS_IN_PAPER, LINEAR, learned_policies
-from hyuav.report.curves import QUANTITIES, learning_figure
+from hyuav.figures.curves import SMOOTHING
+from hyuav.figures.gallery import AS_IN_PAPER, HORIZONS
+from hyuav.report.curves import MAX_POINTS, QUANTITIES, learning_figure
 from hyuav.report.html import Page, Picture, Section
 from hyuav.report.maps import HEIGHT, TITLES, sum_rate_map
 from hyuav.report.player import flight_player
@@ -18,9 +20,6 @@ from hyuav.report.reading import readable_config, readable_evaluation, readable_
 from hyuav.report.tables import configuration_tables, scheme_table
 from hyuav.runs import RunDirectory, named_scenario, readable_metrics
 from hyuav.scenario import Scenario
-
-AS_IN_PAPER = "as_in_paper"
-"""Where the main job keeps the training by the paper's own algorithm, beside its own."""
 
 QUICK = EvaluationParameters(episodes=100, flights=1)
 """How runs are flown that nobody has evaluated."""
@@ -42,19 +41,42 @@ def run_page(directory: Path) -> Page:
     """What a run directory tells, however much of it is there yet."""
     config = readable_config(directory)
     name, scenario = _scenario(config)
-    metrics, evaluation = _metrics(directory), readable_evaluation(directory)
-    if scenario is None and evaluation is not None:  # kept apart from its runs
-        name, scenario = _scenario({"scenario": _named(evaluation)})
-    flown, failure = _flown(directory, name, scenario, evaluation)
-    summary = evaluation if flown is None else flown.summary
+    metrics, evaluations = _metrics(directory), _evaluations(directory, scenario)
+    if scenario is None and evaluations:  # kept apart from its runs
+        name, scenario = _scenario({"scenario": _named(evaluations[0].summary)})
+    flown, failure = _flown(directory, name, scenario, evaluations)
+    known = [own.summary for own in evaluations] or [own.summary for own in flown]
     sections = [
         _flights(flown, failure),
-        _curves(metrics, summary),
-        _schemes(summary, [flown.note] if flown and summary is not evaluation else []),
+        _curves(metrics, known, scenario),
+        _schemes(known, [own.note for own in flown if not evaluations]),
         map_section({name: scenario} if scenario else {}),
         config_section(config),
     ]
     return Page("Run", directory.resolve().name, _facts(config, name, scenario, metrics), sections)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Evaluated:
+    """An evaluation of the run over one horizon."""
+
+    directory: Path
+    summary: dict[str, Any]
+
+
+def _evaluations(directory: Path, scenario: Scenario | None) -> list[_Evaluated]:
+    """Those that can be read, one for each horizon: the scenario's own, then the shortest first."""
+    found: dict[int, _Evaluated] = {}
+    for place in (directory, *directory.glob(f"{HORIZONS}/T*")):
+        summary = readable_evaluation(place)
+        if summary is not None:
+            found.setdefault(summary["num_slots"], _Evaluated(place, summary))
+    return [found[horizon] for horizon in _own_first(found, scenario)]
+
+
+def _own_first(horizons: Iterable[int], scenario: Scenario | None) -> list[int]:
+    own = None if scenario is None else scenario.num_slots
+    return sorted(horizons, key=lambda horizon: (horizon != own, horizon))
 
 
 def _named(evaluation: Mapping[str, Any]) -> dict[str, Any]:
@@ -107,25 +129,28 @@ def _flown(
     directory: Path,
     name: str,
     scenario: Scenario | None,
-    evaluation: dict[str, Any] | None,
-) -> tuple[_Flown | None, str]:
-    """The flights of the evaluation, or else some flown now; and why there are none."""
-    flights = readable_flights(directory)
-    if flights is not None and evaluation is not None:
-        _, flown = _scenario({"scenario": _named(evaluation)})
-        if flown is None:
-            return None, "The evaluation's scenario cannot be read."
+    evaluations: Sequence[_Evaluated],
+) -> tuple[list[_Flown], str]:
+    """The flights of the evaluations, or else some flown now; and why there are none."""
+    kept = [(own.summary, readable_flights(own.directory)) for own in evaluations]
+    if any(flights is not None for _, flights in kept):
         note = "Flights of the evaluation, each scheme's first."
-        return _Flown(flown, evaluation, flights, note), ""
+        flown = [
+            _Flown(of, summary, flights, note)
+            for summary, flights in kept
+            for _, of in [_scenario({"scenario": _named(summary)})]
+            if flights is not None and of is not None
+        ]
+        return flown, "" if flown else "The evaluation's scenario cannot be read."
     if scenario is None:
-        return None, "There is no configuration to fly by."
+        return [], "There is no configuration to fly by."
     run = RunDirectory(directory)
     if not run.best_checkpoint.is_file():
-        return None, "There are no weights to fly by yet."
+        return [], "There are no weights to fly by yet."
     try:
-        return _fly(run, name), ""
+        return [_fly(run, name)], ""
     except InputError as error:
-        return None, f"The weights cannot be flown: {error}"
+        return [], f"The weights cannot be flown: {error}"
 
 
 def _fly(run: RunDirectory, name: str) -> _Flown:
@@ -149,17 +174,18 @@ def _fly(run: RunDirectory, name: str) -> _Flown:
     return _Flown(scenario, evaluation.summary, evaluation.flights, note)
 
 
-def _flights(flown: _Flown | None, failure: str) -> Section:
-    if flown is None:
+def _flights(several: Sequence[_Flown], failure: str) -> Section:
+    if not several:
         return Section("Flights", [failure])
-    schemes = dict.fromkeys(flown.flights["scheme"])
-    figures, notes = {}, [flown.note]
-    for scheme in sorted(schemes, key=lambda own: list(LABELS).index(own) if own in LABELS else 99):
-        label = LABELS.get(scheme, str(scheme))
-        try:
-            figures[label] = flight_player(flown.scenario, flown.flights, scheme)
-        except InputError as error:
-            notes.append(f"{label} is left out: {error}")
+    figures, notes = {}, list(dict.fromkeys(flown.note for flown in several))
+    for flown in several:
+        horizon = f"T = {flown.scenario.num_slots}: " if len(several) > 1 else ""
+        for scheme in sorted(dict.fromkeys(flown.flights["scheme"]), key=_place):
+            label = f"{horizon}{LABELS.get(scheme, scheme)}"
+            try:
+                figures[label] = flight_player(flown.scenario, flown.flights, scheme)
+            except InputError as error:
+                notes.append(f"{label} is left out: {error}")
     notes.append(
         "Move the slider, or play. Filled UEs offload; lines show the links that are alive in the "
         "slot. The thin lines over the sum-rates are what relaying (solid) and jamming (dashed) "
@@ -169,19 +195,19 @@ def _flights(flown: _Flown | None, failure: str) -> Section:
     return Section("Flights", notes, pictures)
 
 
-def _curves(metrics: pd.DataFrame, summary: Mapping[str, Any] | None) -> Section:
-    if not len(metrics):
-        return Section("Learning curves", ["No episode was logged yet."])
-    earned = {} if summary is None else summary["schemes"]
-    optima = {
-        scheme: earned[optimum]["secrecy_sum_rate"]["mean"]
-        for scheme, rule in MODE_RULES.items()
-        if (optimum := OPTIMA[rule]) in earned
-    }
-    horizons = sorted(metrics["num_slots"].dropna().unique())
+def _place(scheme: object) -> int:
+    """In the order of the table; what is unknown comes last."""
+    return list(LABELS).index(str(scheme)) if scheme in LABELS else len(LABELS)
+
+
+def _curves(
+    metrics: pd.DataFrame, summaries: Sequence[Mapping[str, Any]], scenario: Scenario | None
+) -> Section:
+    optima = {summary["num_slots"]: _optima(summary["schemes"]) for summary in summaries}
+    horizons = _own_first(metrics["num_slots"].dropna().unique(), scenario)
     figures = {
         title + (f", T = {horizon:.0f}" if len(horizons) > 1 else ""): learning_figure(
-            own, optima if summary and summary["num_slots"] == horizon else None, quantity
+            own, optima.get(int(horizon)), quantity
         )
         for horizon in horizons
         for own in [metrics[metrics["num_slots"] == horizon]]
@@ -190,13 +216,30 @@ def _curves(metrics: pd.DataFrame, summary: Mapping[str, Any] | None) -> Section
     }
     if not figures:
         return Section("Learning curves", ["No episode was logged yet."])
-    return Section("Learning curves", (), [Picture("Quantity", figures, CURVES_HEIGHT)])
+    notes = [
+        "A line is the interquartile mean over the learners of a scheme, and the band its 95 % "
+        "bootstrap interval; behind a single learner's line stands each episode's reward. The "
+        f"accumulated rewards are means of {SMOOTHING} episodes, and more than {MAX_POINTS} points "
+        "are averaged in groups. Dashed is what only jams, and dotted an optimum."
+    ]
+    if metrics["scheme"].isin(LEARNED_AS_IN_PAPER.values()).any():
+        notes.append("The thinner, paler lines are learned by the paper's own algorithm.")
+    return Section("Learning curves", notes, [Picture("Quantity", figures, CURVES_HEIGHT)])
 
 
-def _schemes(summary: Mapping[str, Any] | None, notes: Sequence[str]) -> Section:
-    if summary is None:
+def _optima(schemes: Mapping[str, Any]) -> dict[str, float]:
+    """What the best flight of each scheme earns in bps/Hz, where it was evaluated."""
+    return {
+        scheme: schemes[optimum]["secrecy_sum_rate"]["mean"]
+        for scheme, rule in MODE_RULES.items()
+        if (optimum := OPTIMA[rule]) in schemes
+    }
+
+
+def _schemes(summaries: Sequence[Mapping[str, Any]], notes: Sequence[str]) -> Section:
+    if not summaries:
         return Section("Schemes", ["There is no evaluation yet."])
-    return Section("Schemes", notes, tables=[scheme_table(summary)])
+    return Section("Schemes", notes, tables=[scheme_table(summary) for summary in summaries])
 
 
 def map_section(scenarios: Mapping[str, Scenario]) -> Section:
