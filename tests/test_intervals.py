@@ -5,7 +5,13 @@ import warnings
 import numpy as np
 import pytest
 
-from hyuav.intervals import Array, interquartile_mean, stratified_interval
+from hyuav.intervals import (
+    Array,
+    interquartile_band,
+    interquartile_curve,
+    interquartile_mean,
+    stratified_interval,
+)
 
 
 def normal(*shape: int) -> Array:
@@ -51,3 +57,18 @@ def test_a_cell_of_one_learner_has_the_weight_of_one() -> None:
     assert low == high == 0.0
     mean = interquartile_mean([np.array([1.0]), np.zeros(3)])
     assert mean == 0.0
+
+
+def test_a_curve_counts_in_each_row_the_samples_that_it_knows() -> None:
+    samples = normal(6, 9)
+    samples[2:, 4] = np.nan
+    samples[4, 1:] = np.nan
+    samples[5] = np.nan
+    curve, (low, high) = interquartile_curve(samples), interquartile_band(samples)
+    for row in range(5):
+        own = samples[row][~np.isnan(samples[row])]
+        assert curve[row] == pytest.approx(interquartile_mean([own]))
+        expected = stratified_interval([own], interquartile_mean)
+        assert (low[row], high[row]) == pytest.approx(expected, abs=0.3)  # by other resamples
+        assert low[row] <= curve[row] <= high[row]
+    assert np.isnan([curve[5], low[5], high[5]]).all()

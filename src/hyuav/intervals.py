@@ -5,7 +5,7 @@ precipice", NeurIPS 2021. A cell holds samples of one kind, as the learners of o
 problem; where there are several cells, the bootstrap draws the samples of each anew.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,3 +54,41 @@ def stratified_interval(samples: Sequence[Array], statistic: Statistic) -> tuple
         rng=np.random.default_rng(SEED),
     ).confidence_interval
     return interval.low, interval.high
+
+
+def interquartile_curve(samples: Array) -> Array:
+    """The interquartile mean of each row over those of its samples that are known.
+
+    Args:
+        samples: (rows, n), NaN where there is none, as of a learner that has stopped.
+
+    Returns:
+        the means (rows,), NaN where a row knows none.
+    """
+    curve = np.full(len(samples), np.nan)
+    for rows, own in _known(samples):
+        curve[rows] = interquartile_mean([own])
+    return curve
+
+
+def interquartile_band(samples: Array) -> tuple[Array, Array]:
+    """The 95 % interval of :func:`interquartile_curve`.
+
+    Args:
+        samples: as for that.
+
+    Returns:
+        the lower and the upper bounds: (rows,).
+    """
+    band = np.full((2, len(samples)), np.nan)
+    for rows, own in _known(samples):
+        band[:, rows] = stratified_interval([own], interquartile_mean)
+    return band[0], band[1]
+
+
+def _known(samples: Array) -> Iterator[tuple[NDArray[np.bool_], Array]]:
+    """The rows that know the same samples, and these."""
+    known = ~np.isnan(samples)
+    for members in np.unique(known[known.any(axis=1)], axis=0):
+        rows = (known == members).all(axis=1)
+        yield rows, samples[np.ix_(rows, members)]

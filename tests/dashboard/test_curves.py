@@ -5,6 +5,7 @@ from scipy import stats
 
 from hyuav.dashboard.curves import MOST_POINTS, Choice, axes_of, comparison, thinned
 from hyuav.figures import COLORS
+from hyuav.report.style import scheme_dash
 
 
 def metrics(rewards: np.ndarray, scheme: str = "hybrid", num_slots: int = 10) -> pd.DataFrame:
@@ -56,6 +57,28 @@ def test_runs_differ_in_their_dashes_and_if_so_chosen_in_their_colors() -> None:
     by_run = comparison(both, {}, Choice(smoothing=1, color_by="run")).data
     assert by_run[0].line.color != by_run[1].line.color
     assert [line.name for line in by_run] == ["Proposed, one", "Proposed, two"]
+
+
+def test_a_learner_that_stops_takes_part_in_the_mean_until_then() -> None:
+    rewards = ramp(4, 8)
+    rewards[:, -1] = 1e6
+    rewards[2:, 0] = np.nan
+    mean = comparison({"run": metrics(rewards)}, {}, PLAIN).data[-1]
+    expected = [
+        *stats.trim_mean(rewards[:2], 0.25, axis=1),
+        *stats.trim_mean(rewards[2:, 1:], 0.25, axis=1),
+    ]
+    assert list(mean.y) == pytest.approx(expected)
+
+
+def test_a_single_runs_schemes_have_the_lines_of_every_figure() -> None:
+    rules = ("hybrid", "relay", "jamming")
+    rows = pd.concat([metrics(ramp(3, 1), rule) for rule in rules])
+    dashes = [line.line.dash for line in comparison({"run": rows}, {}, PLAIN).data]
+    assert dashes == [scheme_dash(scheme) for scheme in ("proposed", "re_ot", "ja_ot")]
+    both = comparison({"one": rows, "two": rows}, {}, Choice(smoothing=1, color_by="run")).data
+    assert len({line.line.dash for line in both[:3]}) == 3
+    assert "dot" not in {line.line.dash for line in both}  # as only optima are
 
 
 def test_curves_are_smoothed_over_episodes_and_drawn_against_slots() -> None:

@@ -1,9 +1,13 @@
+import time
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from hyuav.comparison.statistics import summarize_cells
 from hyuav.figures import COLORS
+from hyuav.figures.curves import learning_table
+from hyuav.figures.style import LINES
 from hyuav.report.curves import MAX_POINTS, comparison_figures, learning_figure
 
 
@@ -40,20 +44,52 @@ def test_a_scheme_has_its_color_in_every_figure() -> None:
         "Ja-OT": COLORS["ja_ot"],
         "Paper Proposed": COLORS["proposed"],
     }
-    assert lines["Proposed"].dash == "solid"
-    assert lines["Paper Proposed"].dash != "solid"
 
 
-def test_the_band_goes_from_the_worst_to_the_best_learner() -> None:
-    metrics = _metrics(40, {"hybrid": 3})
-    (band,) = (trace for trace in learning_figure(metrics).data if trace.fill == "toself")
-    smooth = (
-        metrics.pivot_table("accumulated_reward", "episode", "learner")
-        .rolling(25, min_periods=1)
-        .mean()
-    )
-    np.testing.assert_allclose(band.y[:40], smooth.min(axis=1), atol=1e-3)
-    np.testing.assert_allclose(band.y[40:][::-1], smooth.max(axis=1), atol=1e-3)
+def test_what_jams_is_dashed_and_what_the_papers_algorithm_learns_thinner_and_paler() -> None:
+    schemes = ["hybrid", "relay", "jamming", "proposed_paper", "re_ot_paper", "ja_ot_paper"]
+    figure = learning_figure(_metrics(30, dict.fromkeys(schemes, 1)), {"jamming": 57.0})
+    drawn = {trace.name: trace for trace in figure.data if trace.name}
+    for name in ("Proposed", "Re-OT", "Ja-OT"):
+        own, paper = drawn[name], drawn[f"Paper {name}"]
+        assert own.line.dash == paper.line.dash
+        assert (own.line.dash == "solid") == (LINES[name.lower().replace("-", "_")] == "solid")
+        assert paper.line.width < own.line.width
+        assert paper.opacity < (own.opacity or 1.0)
+    assert drawn["its optimum"].line.dash == figure.layout.shapes[0].line.dash
+    assert drawn["its optimum"].line.dash not in {drawn["Ja-OT"].line.dash, "solid"}
+
+
+def test_the_line_and_its_band_are_those_of_the_printed_figure() -> None:
+    metrics = _metrics(40, {"hybrid": 8})
+    rewards = metrics.pivot_table("accumulated_reward", "episode", "learner")
+    rewards[7] += 1000.0
+    metrics = rewards.reset_index().melt("episode", value_name="accumulated_reward")
+    figure = learning_figure(metrics.assign(scheme="hybrid", num_slots=20))
+    (band,) = (trace for trace in figure.data if trace.fill == "toself")
+    (line,) = (trace for trace in figure.data if trace.name == "Proposed")
+    printed = learning_table({"proposed": rewards}, {})
+    np.testing.assert_allclose(line.y, printed["iqm"], atol=1e-3)
+    np.testing.assert_allclose(band.y[:40], printed["low"], atol=1e-3)
+    np.testing.assert_allclose(band.y[40:][::-1], printed["high"], atol=1e-3)
+
+
+def test_a_learner_that_stopped_leaves_the_band_of_the_others() -> None:
+    metrics = _metrics(60, {"hybrid": 3})
+    early = metrics[(metrics["learner"] != 2) | (metrics["episode"] <= 20)]
+    (band,) = (trace for trace in learning_figure(early).data if trace.fill == "toself")
+    (line,) = (trace for trace in learning_figure(early).data if trace.name == "Proposed")
+    assert len(band.y) == 2 * len(line.y) == 120
+    assert np.isfinite(np.array([*band.y, *line.y], dtype=float)).all()
+
+
+def test_a_hundred_thousand_episodes_of_ten_learners_are_drawn_within_seconds() -> None:
+    rewards = np.random.default_rng(0).normal(size=(100_000, 10))
+    table = pd.DataFrame(rewards).rename_axis(index="episode", columns="learner")
+    rows = table.reset_index().melt("episode", value_name="accumulated_reward")
+    began = time.process_time()
+    learning_figure(rows.assign(scheme="hybrid", num_slots=20))
+    assert time.process_time() - began < 15.0
 
 
 def test_each_scheme_that_learned_has_the_line_of_its_optimum() -> None:
@@ -67,7 +103,9 @@ def test_several_horizons_can_be_told_apart() -> None:
     metrics = pd.concat([_metrics(5, {"hybrid": 1}, slots) for slots in (10, 20)])
     lines = {trace.name: trace.line for trace in learning_figure(metrics).data if trace.name}
     assert set(lines) == {"Proposed, T = 10", "Proposed, T = 20"}
-    assert len({line.dash for line in lines.values()}) == 2
+    assert {line.dash for line in lines.values()} == {"solid"}
+    symbols = {trace.marker.symbol for trace in learning_figure(metrics).data if trace.name}
+    assert len(symbols) == 2
 
 
 def test_metrics_without_rows_say_so() -> None:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from hyuav.evaluation import LABELS, OPTIMA
 from hyuav.experiment import LEARNED
-from hyuav.intervals import interquartile_mean
-from hyuav.report.style import axis, base_layout, plain, scheme_color
+from hyuav.intervals import interquartile_curve
+from hyuav.report.style import axis, base_layout, plain, scheme_color, scheme_dash
 
 Values = NDArray[np.float64]
 
@@ -41,8 +41,11 @@ RUN_COLORS = (
 )
 """Paul Tol's muted colours, where a colour tells runs and not schemes apart."""
 
-DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
-"""Tell runs apart where a colour tells schemes apart."""
+DASHES = ("solid", "dash", "dashdot", "longdash", "longdashdot")
+"""Tell several runs apart where a colour tells schemes apart; dotted are the optima."""
+
+SCHEME_DASHES = {"hybrid": "solid", "relay": "longdash", "jamming": "dash"}
+"""Tell schemes apart by their rules where a colour tells runs apart."""
 
 MOST_POINTS = 1000
 """Of a line in the figure: more than a screen has columns."""
@@ -87,11 +90,8 @@ class Curves:
         return f"{scheme}, T = {self.horizon}" if self.several_horizons else scheme
 
     def middle(self) -> Values:
-        """The learners' interquartile mean, or their mean where there are few of them."""
-        values = self.lines.to_numpy(dtype=float)
-        if self.lines.shape[1] < FEWEST_FOR_QUARTILES or np.isnan(values).any():
-            return np.asarray(self.lines.mean(axis=1), dtype=float)
-        return np.asarray(interquartile_mean([values]), dtype=float)
+        """The interquartile mean of those learners that have not stopped."""
+        return interquartile_curve(self.lines.to_numpy(dtype=float))
 
 
 def learned_label(rule: str) -> str:
@@ -134,8 +134,9 @@ def comparison(
 ) -> go.Figure:
     """The curves of several runs: a thin line for each learner, and their mean.
 
-    A colour stands for a scheme, as everywhere, and a dash pattern for a run; or, if so chosen,
-    a colour for a run and a dash pattern for a scheme.
+    A colour stands for a scheme, as everywhere, and a dash pattern for a run, or where there is one
+    run, as everywhere, for whether a scheme relays or jams; or, if so chosen, a colour for a run
+    and a dash pattern for a scheme.
 
     Args:
         metrics: by the run's name.
@@ -143,12 +144,9 @@ def comparison(
         choice: what is drawn.
     """
     figure = go.Figure()
-    schemes: list[str] = []
     for index, (run, rows) in enumerate(metrics.items()):
         for curves in curves_of(run, rows, choice):
-            if curves.scheme not in schemes:
-                schemes.append(curves.scheme)
-            line = _line(choice, index, schemes.index(curves.scheme), curves.scheme)
+            line = _line(choice, index, curves.scheme, several_runs=len(metrics) > 1)
             figure.add_traces(list(_traces(curves, line, several_runs=len(metrics) > 1)))
             optimum = optima.get(run, {}).get(curves.scheme)
             if optimum is not None and choice.y in OF_THE_RETURN and not curves.several_horizons:
@@ -173,10 +171,13 @@ def comparison(
     return figure
 
 
-def _line(choice: Choice, run: int, scheme: int, rule: str) -> dict[str, Any]:
+def _line(choice: Choice, run: int, rule: str, *, several_runs: bool) -> dict[str, Any]:
     if choice.color_by == "run":
-        return {"color": RUN_COLORS[run % len(RUN_COLORS)], "dash": DASHES[scheme % len(DASHES)]}
-    return {"color": scheme_color(LEARNED.get(rule, rule)), "dash": DASHES[run % len(DASHES)]}
+        dash = SCHEME_DASHES.get(rule, "dashdot")
+        return {"color": RUN_COLORS[run % len(RUN_COLORS)], "dash": dash}
+    scheme = LEARNED.get(rule, rule)
+    dash = DASHES[run % len(DASHES)] if several_runs else scheme_dash(scheme)
+    return {"color": scheme_color(scheme), "dash": dash}
 
 
 def _traces(curves: Curves, line: dict[str, Any], *, several_runs: bool) -> Iterator[go.Scatter]:

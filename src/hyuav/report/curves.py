@@ -14,6 +14,7 @@ from hyuav.comparison.tables import label
 from hyuav.evaluation import LABELS
 from hyuav.experiment import LEARNED
 from hyuav.figures.curves import SMOOTHING
+from hyuav.intervals import interquartile_band, interquartile_curve
 from hyuav.report.style import (
     DASHES,
     GRID_COLOR,
@@ -27,7 +28,7 @@ from hyuav.report.style import (
     translucent,
 )
 
-MAX_POINTS = 500
+MAX_POINTS = 300
 """Of a curve; neighbouring episodes are averaged where there are more."""
 
 QUANTITIES = {
@@ -41,7 +42,12 @@ _ENTRY_DASHES = ("solid", "8px,4px", "2px,3px", "10px,3px,2px,3px", "18px,4px")
 _ENTRY_MARKERS = ("circle", "square", "triangle-up", "diamond", "triangle-down")
 """Of :func:`hyuav.comparison.charts.dash`."""
 
-_HORIZON_DASHES = ("solid", "8px,3px,2px,3px", "2px,2px", "10px,4px")
+_HORIZON_MARKERS = ("circle", "square", "triangle-up", "diamond")
+_MARKERS = 12
+"""Of a line, where they tell horizons apart."""
+
+_WIDTH_AND_OPACITY = {"own": (2.2, 1.0), "paper": (1.3, 0.6)}
+"""Of the line of what is learned, and of the same by the paper's own algorithm."""
 
 
 def learning_figure(
@@ -51,8 +57,10 @@ def learning_figure(
 ) -> go.Figure:
     """What learners earned against the episodes, a color per scheme.
 
-    The line is the mean over a scheme's learners, smoothed where it is noisy; a band goes from the
-    worst to the best of several. A single learner's own curve stands behind as a thin line.
+    The line is the interquartile mean over a scheme's learners, each smoothed where it is noisy;
+    the band is its 95 % bootstrap interval. A single learner's own curve stands behind as a thin
+    line. What is learned by the paper's own algorithm has a thinner, paler line; several horizons
+    differ in their markers.
 
     Args:
         metrics: rows of ``metrics.csv``, whose ``scheme`` is a mode rule as it stands there, or
@@ -69,11 +77,13 @@ def learning_figure(
     for scheme, horizon in sorted(pairs, key=lambda pair: (order.get(pair[0], len(order)), pair)):
         rows = named[(named["scheme"] == scheme) & (named["num_slots"] == horizon)]
         rewards = rows.pivot_table(quantity, "episode", "learner", sort=True)
-        text, dash = scheme_label(scheme), scheme_dash(scheme)
+        text, look = scheme_label(scheme), _look(scheme)
         if len(horizons) > 1:
             text += f", T = {horizon:.0f}"
-            dash = _HORIZON_DASHES[horizons.index(horizon) % len(_HORIZON_DASHES)]
-        _add_curve(figure, rewards, text, scheme_color(scheme), dash, quantity)
+            symbol = _HORIZON_MARKERS[horizons.index(horizon) % len(_HORIZON_MARKERS)]
+            look |= {"mode": "lines+markers"}
+            look["marker"] |= {"symbol": symbol, "size": 7, "maxdisplayed": _MARKERS}
+        _add_curve(figure, rewards, text, scheme_color(scheme), look, quantity)
     if len(horizons) <= 1:
         drawn_schemes = {scheme for scheme, _ in pairs}
         best = {LEARNED.get(name, name): value for name, value in (optima or {}).items()}
@@ -95,48 +105,61 @@ def _pairs(rows: pd.DataFrame) -> Iterable[tuple[object, float]]:
     return zip(rows["scheme"], rows["num_slots"], strict=True)
 
 
+def _look(scheme: str) -> dict[str, Any]:
+    """A scheme's line, as :meth:`plotly.graph_objects.Figure.add_scatter` takes it."""
+    kind = "paper" if scheme.endswith("_paper") else "own"
+    hue, (width, opacity) = scheme_color(scheme), _WIDTH_AND_OPACITY[kind]
+    line = {"color": hue, "dash": scheme_dash(scheme), "width": width}
+    return {"mode": "lines", "marker": {"color": hue}, "line": line, "opacity": opacity}
+
+
 def _add_curve(
-    figure: go.Figure, rewards: pd.DataFrame, text: str, hue: str, dash: str, quantity: str
+    figure: go.Figure,
+    rewards: pd.DataFrame,
+    text: str,
+    hue: str,
+    look: dict[str, Any],
+    quantity: str,
 ) -> None:
     """One scheme's curve from a column per learner and a row per episode."""
     noisy = quantity == "accumulated_reward"
-    smooth = rewards.rolling(SMOOTHING if noisy else 1, min_periods=1).mean()
+    smooth = _thinned(rewards.rolling(SMOOTHING if noisy else 1, min_periods=1).mean())
+    samples, across = smooth.to_numpy(dtype=float), list(smooth.index)
     group: dict[str, Any] = {"legendgroup": text, "hoverinfo": "skip", "showlegend": False}
     if rewards.shape[1] > 1:
-        low, high = _thinned(smooth.min(axis=1)), _thinned(smooth.max(axis=1))
+        low, high = interquartile_band(samples)
         figure.add_scatter(
-            x=[*low.index, *high.index[::-1]],
-            y=[*low, *high[::-1]],
+            x=[*across, *across[::-1]],
+            y=[*low.round(4), *high.round(4)[::-1]],
             mode="none",
             fill="toself",
-            fillcolor=translucent(hue, 0.2),
+            fillcolor=translucent(hue, 0.2 * look["opacity"]),
             **group,
         )
     elif noisy:
-        raw = _thinned(rewards.iloc[:, 0])
+        raw = _thinned(rewards)
         line = {"color": translucent(hue, 0.25), "width": 0.8}
-        figure.add_scatter(x=list(raw.index), y=list(raw), mode="lines", line=line, **group)
-    mean = _thinned(smooth.mean(axis=1))
+        figure.add_scatter(
+            x=list(raw.index), y=list(raw.iloc[:, 0].round(4)), mode="lines", line=line, **group
+        )
     figure.add_scatter(
-        x=list(mean.index),
-        y=list(mean),
-        mode="lines" if len(mean) > 1 else "markers",
-        line={"color": hue, "width": 2.2, "dash": dash},
-        marker={"color": hue},
+        x=across,
+        y=list(interquartile_curve(samples).round(4)),
+        **look | ({} if len(across) > 1 else {"mode": "markers"}),
         name=text,
         legendgroup=text,
         hovertemplate=f"{text}, episode %{{x:.0f}}: %{{y:.2f}} bps/Hz<extra></extra>",
     )
 
 
-def _thinned(values: "pd.Series[float]") -> "pd.Series[float]":
-    """At most :data:`MAX_POINTS` values, each the mean of neighbours at their last episode."""
-    step = math.ceil(len(values) / MAX_POINTS)
+def _thinned(rewards: pd.DataFrame) -> pd.DataFrame:
+    """At most :data:`MAX_POINTS` rows, each the mean of neighbours at their last episode."""
+    step = math.ceil(len(rewards) / MAX_POINTS)
     if step <= 1:
-        return values.round(4)
-    groups = np.arange(len(values)) // step
-    last = values.index.to_series().groupby(groups).last()
-    return pd.Series(values.groupby(groups).mean().round(4).to_numpy(), index=last)
+        return rewards
+    groups = np.arange(len(rewards)) // step
+    last = rewards.index.to_series().groupby(groups).last()
+    return rewards.groupby(groups).mean().set_axis(last.to_numpy())
 
 
 def _add_optima(figure: go.Figure, optima: Mapping[str, float]) -> None:

@@ -3,7 +3,7 @@
 import html
 from typing import Any
 
-from hyuav.evaluation import LABELS
+from hyuav.evaluation import LABELS, MODE_RULES, OPTIMA
 from hyuav.figures import COLORS
 
 OPTIMUM_COLOR = "#6B6B6B"
@@ -12,12 +12,12 @@ INK = "#222222"
 
 FONT = {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif", "color": INK}
 
-DASHES = {"solid": "solid", "paper": "6px,3px", "optimum": "2px,3px"}
-"""Lines of what is learned, of the same by the paper's own algorithm, and of optima."""
+DASHES = {"relay": "solid", "jamming": "6px,3px", "optimum": "2px,3px"}
+"""Lines of what relays, or may, of what only jams, and of optima; as in the printed figures."""
 
 
 def scheme_color(scheme: str) -> str:
-    """The scheme's color in every figure; grey for an optimum."""
+    """The scheme's color in every figure; grey for an unknown one."""
     return COLORS.get(scheme, OPTIMUM_COLOR)
 
 
@@ -27,8 +27,10 @@ def scheme_label(scheme: str) -> str:
 
 
 def scheme_dash(scheme: str) -> str:
-    """The line of a scheme's learning curve."""
-    return DASHES["paper" if scheme.endswith("_paper") else "solid"]
+    """The scheme's line in every figure."""
+    if scheme in OPTIMA.values():
+        return DASHES["optimum"]
+    return DASHES["jamming" if MODE_RULES.get(scheme) == "jamming" else "relay"]
 
 
 def plain(text: object) -> str:
