@@ -40,6 +40,10 @@ PRESET, SAVED, RUN = "preset ", "saved ", "run "
 
 NOBODY = "none"
 
+_OUTLINES = (
+    " White lines go around where relaying brings more (solid) and where jamming does (dashed)."
+)
+
 BEST = ("checkpoints", "best.pt")
 """Where a run keeps its best weights."""
 
@@ -251,6 +255,7 @@ def _tell_accuracy(scenario: Scenario, rule: str) -> None:
     st.caption(
         f"The optimum is exact on a grid of {spacing:g} m with {draws} draws of the fading; "
         f"means are of the same {EPISODES.episodes} episodes. The map is without fading."
+        f"{_OUTLINES if rule == 'hybrid' else ''}"
     )
     if not fine:
         finer = f"Refine the optimum to {resolution(scenario, fine=True):g} m"

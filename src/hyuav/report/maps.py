@@ -2,6 +2,7 @@
 
 import numpy as np
 import plotly.graph_objects as go
+from numpy.typing import NDArray
 
 from hyuav.envs.rendering import EAVESDROPPER_COLOR, LEGITIMATE_COLOR
 from hyuav.maps import Mode, sum_rates_over_map
@@ -17,8 +18,9 @@ TITLES: dict[Mode, str] = {"relay": "Relay", "jamming": "Jamming", "better": "Be
 def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 2.0) -> go.Figure:
     """The secrecy sum-rate at every helper position, without fading.
 
-    The scale is the same in every mode; on the map of the better mode, a white line separates
-    where relaying is better from where jamming is.
+    The scale is the same in every mode. On the map of the better mode, a white line goes around
+    where relaying is better, and a dashed one around where jamming is: where both regions meet,
+    the solid one lies above.
 
     Args:
         scenario: whose map is drawn.
@@ -45,18 +47,8 @@ def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 
         hovertemplate="helper at (%{x:.0f}, %{y:.0f}) m: %{z:.2f} bps/Hz<extra></extra>",
     )
     if mode == "better":
-        chosen = np.where(
-            rates.better > 0, (rates.relay > rates.jamming).astype(np.float32), np.nan
-        )
-        figure.add_contour(
-            x=rates.axis,
-            y=rates.axis,
-            z=chosen,
-            contours={"start": 0.5, "end": 0.5, "size": 1, "coloring": "none"},
-            line={"color": "white", "width": 1.2},
-            showscale=False,
-            hoverinfo="skip",
-        )
+        _outline(figure, rates.axis, rates.jamming > rates.relay, "dash")
+        _outline(figure, rates.axis, rates.relay > rates.jamming, "solid")
     _add_nodes(figure, scenario)
     half = scenario.map_side / 2
     square = {"range": [-half, half], "constrain": "domain", "nticks": 6, "mirror": True}
@@ -69,6 +61,22 @@ def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 
         yaxis=axis("y (m)", **square, scaleanchor="x", scaleratio=1),
     )
     return figure
+
+
+def _outline(
+    figure: go.Figure, axis: NDArray[np.float64], region: NDArray[np.bool_], dash: str
+) -> None:
+    """A line around a region of the map; nothing where there is none."""
+    if region.any():
+        figure.add_contour(
+            x=axis,
+            y=axis,
+            z=region.astype(np.float32),
+            contours={"start": 0.5, "end": 0.5, "size": 1, "coloring": "none"},
+            line={"color": "white", "width": 1.5, "dash": dash},
+            showscale=False,
+            hoverinfo="skip",
+        )
 
 
 def _add_nodes(figure: go.Figure, scenario: Scenario) -> None:

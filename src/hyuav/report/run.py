@@ -257,8 +257,9 @@ def map_section(scenarios: Mapping[str, Scenario]) -> Section:
         for mode, title in TITLES.items()
     ]
     notes = [
-        "The secrecy sum-rate of one slot at every position of the helper, without fading. The "
-        "white line separates where relaying is better from where jamming is; the dotted circle "
+        "The secrecy sum-rate of one slot at every position of the helper, without fading. On the "
+        "map of the better mode, the solid white line goes around where relaying is better, the "
+        "dashed one around where jamming is; elsewhere neither brings anything. The dotted circle "
         "is the coverage of the legitimate UAV."
     ]
     return Section("Maps", notes, pictures)
