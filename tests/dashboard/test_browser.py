@@ -187,6 +187,21 @@ def test_a_scenario_is_changed_flown_and_saved(
 
 
 @WIDTHS
+def test_the_explorers_map_fills_its_figure(opened: BrowserPage) -> None:
+    go_to(opened.page, "Scenario explorer")
+    plot = opened.page.locator(".js-plotly-plot").first
+    expect(plot.locator(".nsewdrag")).to_be_visible()
+    rest(opened.page)
+    frame, square = plot.bounding_box(), plot.locator(".nsewdrag").bounding_box()
+    assert frame is not None
+    assert square is not None
+    below = frame["y"] + frame["height"] - square["y"] - square["height"]
+    assert 20 < below < 70  # the title of its axis
+    assert square["height"] > 0.65 * frame["width"]
+    assert opened.page.locator(".js-plotly-plot .legend").first.is_visible()
+
+
+@WIDTHS
 def test_an_empty_directory_is_followed_from_the_first_episode(
     context: BrowserContext, size: tuple[int, int], tmp_path: Path
 ) -> None:

@@ -40,6 +40,16 @@ PRESET, SAVED, RUN = "preset ", "saved ", "run "
 
 NOBODY = "none"
 
+MAP = "explorer-map"
+"""Container of the map."""
+
+_TALLEST, _ABOVE = 740, 140
+"""Pixels of the map's figure, and how much higher it is than a narrow page is wide."""
+
+_MAP_HEIGHT = f"""<style>
+:has(> .st-key-{MAP}) {{ flex-basis: min({_TALLEST}px, 100vw + {_ABOVE}px) !important; }}
+</style>"""
+
 _OUTLINES = (
     " White lines go around where relaying brings more (solid) and where jamming does (dashed)."
 )
@@ -148,14 +158,17 @@ def _explore(index: RunIndex, scenario: Scenario) -> Evaluation | None:
         _tell(evaluation, rule)
     figure = _figure(scenario, rule, mapped, evaluation)
     key = f"map-{st.session_state['edition']}-{st.session_state.get('placed', 0)}"
-    st.plotly_chart(
-        figure,
-        theme=None,
-        key=key,
-        on_select=lambda: _place(key),
-        selection_mode="points",
-        config={"displayModeBar": False},
-    )
+    st.html(_MAP_HEIGHT)
+    with st.container(key=MAP, height=_TALLEST, border=False):
+        st.plotly_chart(
+            figure,
+            theme=None,
+            key=key,
+            height="stretch",
+            on_select=lambda: _place(key),
+            selection_mode="points",
+            config={"displayModeBar": False},
+        )
     if evaluation is not None:
         _tell_accuracy(scenario, rule)
     return evaluation

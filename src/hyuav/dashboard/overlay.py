@@ -57,7 +57,7 @@ def explorer_map(scenario: Scenario, rule: str, quantity: str) -> go.Figure:
     figure.for_each_trace(_stay_bright, selector={"type": "scatter"})
     figure.update_layout(
         title=None,
-        height=740,
+        height=None,  # the page's
         margin={"l": 50, "r": 20, "t": 150, "b": 10},
         showlegend=True,
         legend={"orientation": "h", "yref": "container", "y": 1.0, "yanchor": "top", "x": 0.0},
