@@ -22,7 +22,7 @@ from hyuav.figures import save_flight_map
 from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text, thread_count
 from hyuav.report.page import write_run_report
 from hyuav.runs import RunDirectory, require_writable
-from hyuav.terminal import print_line
+from hyuav.terminal import make_progress, print_line
 from hyuav.tracking import EvaluationLoggerParameters, log_evaluation
 
 
@@ -70,7 +70,15 @@ def main(config: Config, _: Path) -> None:
         **learned_policies(runs, scenario),
         **reference_policies(scenario, parameters.resolution, console),
     }
-    evaluation = evaluate(scenario, first.scenario_name, policies, parameters, options.device)
+    with make_progress(console, "evaluating") as progress:
+        evaluation = evaluate(
+            scenario,
+            first.scenario_name,
+            policies,
+            parameters,
+            options.device,
+            track=progress.track,
+        )
     evaluation.save(output)
     save_flight_map(scenario, evaluation.flights, output / "figures")
     print_results(evaluation, console)

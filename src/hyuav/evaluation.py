@@ -1,7 +1,7 @@
 """Fly any set of schemes through the same fading and account for each in one table."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -113,6 +113,8 @@ def evaluate(
     policies: Mapping[str, Sequence[Policy]],
     parameters: EvaluationParameters,
     device: torch.device | str | None = None,
+    *,
+    track: Callable[[Sequence[str]], Iterable[str]] = iter,
 ) -> Evaluation:
     """Fly every scheme through the same draws of fading and tasks.
 
@@ -123,6 +125,7 @@ def evaluate(
             Fractions of the optimum are given where the optima are among them.
         parameters: how many episodes, how many of them kept slot by slot, and the seed.
         device: to fly on.
+        track: passes on the schemes one by one, as what shows the progress does.
 
     Raises:
         InputError: no scheme, an unknown one, or one without a policy.
@@ -137,8 +140,7 @@ def evaluate(
         scheme: _together(
             [fly(scenario, scheme, policy, parameters, device) for policy in policies[scheme]]
         )
-        for scheme in LABELS
-        if scheme in policies
+        for scheme in track([scheme for scheme in LABELS if scheme in policies])
     }
     returns = {
         scheme: flights.totals["secrecy_sum_rate"].numpy() for scheme, flights in flown.items()

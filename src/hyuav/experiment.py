@@ -1,7 +1,7 @@
 """What the recipes do: train into a run directory, gather the schemes, tell what came of it."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,14 @@ from hyuav.interruption import Interruption
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file
 from hyuav.learning.cohort import Learner
-from hyuav.learning.training import Training
+from hyuav.learning.training import Episode, Training
 from hyuav.learning.weights import count_learners, join_learners, select_learner
 from hyuav.runs import RunConfiguration, RunDirectory, require_writable
 from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
 from hyuav.schemes.linear import ConstantVelocity, ja_lt, re_lt
 from hyuav.schemes.optimum import FlightPolicy, solve
-from hyuav.terminal import print_line, print_table, results_table
+from hyuav.terminal import make_progress, print_line, print_table, results_table
 from hyuav.tracking import LoggerParameters, Tracker
 from hyuav.tracking.checkpoints import Reported, first_checkpoint, restore
 
@@ -216,6 +216,7 @@ def select_initial_weights(
     episodes: int,
     *,
     device: str | None = None,
+    track: Callable[[Iterable[Episode]], Iterable[Episode]] = iter,
 ) -> tuple[dict[str, Tensor], list[float]]:
     """Begin where a higher reward was reached: the best flyer of a few short trainings.
 
@@ -229,6 +230,7 @@ def select_initial_weights(
         candidates: short trainings for each of its schemes and seeds.
         episodes: of each candidate.
         device: to train on.
+        track: passes on the episodes one by one, as what shows the progress does.
 
     Returns:
         the chosen candidates' weights, and what they earn (N,) in bps/Hz.
@@ -249,7 +251,7 @@ def select_initial_weights(
         dataclasses.replace(configuration.training, num_episodes=episodes),
         device,
     )
-    for _ in training.episodes():
+    for _ in track(training.episodes()):
         pass
     weights = training.best_weights
     training.load_weights(weights)
@@ -331,7 +333,7 @@ def reference_policies(
     Args:
         scenario: to fly.
         resolution: of the optimum's grid in m.
-        console: for what is left out.
+        console: for what is left out, and for the progress.
     """
     policies = {}
     for name, scheme in LINEAR.items():
@@ -339,7 +341,9 @@ def reference_policies(
             policies[name] = [Policy(scheme(scenario))]
         except InputError as error:
             print_line(f"{LABELS[name]} is left out: {error}", console)
-    for rule, optimum in solve(scenario, resolution=resolution).items():
+    with make_progress(console, "optima") as progress:
+        optima = solve(scenario, resolution=resolution, track=progress.track)
+    for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [Policy(FlightPolicy(optimum.path, scenario))]
     return policies
 

@@ -34,7 +34,7 @@ from hyuav.figures.over_time import (
 from hyuav.figures.style import COMPARED, save_figure, save_tables
 from hyuav.runs import RunDirectory
 from hyuav.scenario import Scenario
-from hyuav.terminal import print_line
+from hyuav.terminal import make_progress, print_line
 
 AS_IN_PAPER, HORIZONS = "as_in_paper", "horizons"
 """Directories within a main job's run: the paper's own algorithm, and other horizons."""
@@ -220,9 +220,10 @@ def draw(run: RunDirectory, names: Sequence[str] | None, console: Console) -> No
     """
     within = sorted(file.parent for file in run.path.glob("*/config.yaml"))
     further = [RunDirectory(path) for path in within if path.name != AS_IN_PAPER]
-    for each in (run, *further):
-        finished = Finished(each)
-        for name in names or FIGURES:
+    several = [(each, Finished(each)) for each in (run, *further)]
+    drawings = [(*own, name) for own in several for name in names or FIGURES]
+    with make_progress(console, "figures") as progress:
+        for each, finished, name in progress.track(drawings):
             try:
                 FIGURES[name](finished, each.figures, name)
             except InputError as error:

@@ -12,7 +12,7 @@ only. Positions are taken from a grid, which makes V a lower bound to the contin
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -101,6 +101,7 @@ def solve(
     draws: int = 256,
     evaluation_draws: int = 10_000,
     seed: int = 0,
+    track: Callable[[Sequence[str]], Iterable[str]] = iter,
 ) -> dict[str, Optimum]:
     """The best flight of each scheme over the scenario's T slots.
 
@@ -112,6 +113,7 @@ def solve(
             at all positions. They choose the flight and nothing else.
         evaluation_draws: of whole episodes, from which the flight's value is estimated.
         seed: of all draws; not used where no slot is random.
+        track: passes on the schemes one by one, as what shows the progress does.
 
     Returns:
         an :class:`Optimum` for each scheme.
@@ -130,6 +132,7 @@ def solve(
         draws=draws,
         evaluation_draws=evaluation_draws,
         seed=seed,
+        track=track,
     )
     return {scheme: optima[scenario.num_slots] for scheme, optima in found.items()}
 
@@ -143,6 +146,7 @@ def solve_horizons(
     draws: int = 256,
     evaluation_draws: int = 10_000,
     seed: int = 0,
+    track: Callable[[Sequence[str]], Iterable[str]] = iter,
 ) -> dict[str, dict[int, Optimum]]:
     """The best flight of each scheme over each horizon, from one backward pass.
 
@@ -155,6 +159,7 @@ def solve_horizons(
         draws: that the expected reward is averaged over.
         evaluation_draws: from which each flight's value is estimated.
         seed: of all draws.
+        track: passes on the schemes.
 
     Returns:
         by scheme and horizon.
@@ -176,7 +181,7 @@ def solve_horizons(
     grid = grid_over_map(scenario, resolution)
     maps = reward_maps(system, grid.positions(), draws, torch.Generator().manual_seed(map_seed))
     optima: dict[str, dict[int, Optimum]] = {}
-    for scheme in schemes:
+    for scheme in track(schemes):
         reward = maps[SCHEMES.index(scheme)].reshape(grid.shape).numpy()
         reach = _reach(system, scheme, grid, resolution)
         values = values_to_go(reward, reach, longest)
