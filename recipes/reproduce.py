@@ -51,8 +51,8 @@ from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.scenario import PRESETS, Scenario
 from hyuav.schemes.optimum import require_resolution
 from hyuav.system import SCHEMES
-from hyuav.terminal import print_line
-from hyuav.tracking import LoggerParameters, log_evaluation
+from hyuav.terminal import make_progress, print_line
+from hyuav.tracking import LoggerParameters, log_evaluation, part_of
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,7 @@ def reproduce(config: Config, directory: Path) -> None:
     options = section(config, Reproduce)
     torch.set_num_threads(options.threads)
     work = Work(
+        directory,
         EvaluationParameters.from_dict(config["evaluation"]),
         LoggerParameters.from_dict(config["logger"]),
         options.device,
@@ -122,19 +123,23 @@ def reproduce(config: Config, directory: Path) -> None:
     weights = partial(_candidates, as_in_paper, options, console)
     paper_run = work.train(directory / AS_IN_PAPER, as_in_paper, weights)
     paper = learned_policies([paper_run], scenario, LEARNED_AS_IN_PAPER)
-    evaluations = [work.evaluate(run, scenario, run.path, paper)]
+    own_evaluation = work.evaluate(run, scenario, run.path, paper)
+    logged = [(run.path, own_evaluation, [run, paper_run])]
     for num_slots in others:
         over = dataclasses.replace(scenario, num_slots=num_slots)
-        work.evaluate(run, over, horizon_directory(run, num_slots))
+        path = horizon_directory(run, num_slots)
+        logged.append((path, work.evaluate(run, over, path), [run]))
+    evaluations = [own_evaluation]
     for configuration in further:
         beside = work.train(directory / configuration.scenario_name, configuration)
         evaluations.append(work.evaluate(beside, configuration.scenario, beside.path))
+        logged.append((beside.path, evaluations[-1], [beside]))
     draw(run, options.figures, console)
-    reports = [
-        write_run_report(path)
-        for path in (run.path, *(run.path / own.scenario_name for own in further))
-    ]
-    log_evaluation(run.path, evaluations[0], [run, paper_run], work.logger, console)
+    paths = [run.path, *(run.path / own.scenario_name for own in further)]
+    with make_progress(console, "reports") as progress:
+        reports = [write_run_report(path) for path in progress.track(paths)]
+    for path, evaluation, trained in logged:
+        work.log(path, evaluation, trained)
     for evaluation in evaluations:
         print_results(evaluation, console)
     print_line(f"figures: {run.figures}", console)
@@ -146,6 +151,7 @@ def reproduce(config: Config, directory: Path) -> None:
 class Work:
     """What all trainings and evaluations of the job share."""
 
+    directory: Path
     evaluation: EvaluationParameters
     logger: LoggerParameters
     device: str
@@ -162,7 +168,7 @@ class Work:
         return train_or_resume(
             path,
             configuration,
-            self.logger,
+            part_of(self.logger, self.directory, path),
             self.console,
             device=self.device,
             initial_weights=initial_weights,
@@ -183,9 +189,18 @@ class Work:
             **reference_policies(scenario, self.evaluation.resolution, self.console),
         }
         name = run.configuration().scenario_name
-        evaluation = evaluate(scenario, name, policies, self.evaluation, self.device)
+        with make_progress(self.console, "evaluating") as progress:
+            evaluation = evaluate(
+                scenario, name, policies, self.evaluation, self.device, track=progress.track
+            )
         evaluation.save(directory)
         return evaluation
+
+    def log(self, directory: Path, evaluation: Evaluation, trained: Sequence[RunDirectory]) -> None:
+        """Log an evaluation in the group of the job's trainings, as a run of its own."""
+        logger = part_of(self.logger, self.directory, directory)
+        logger = dataclasses.replace(logger, id=None)
+        log_evaluation(directory, evaluation, trained, logger, self.console)
 
 
 def _other_horizons(scenario: Scenario, options: Reproduce) -> list[int]:
@@ -244,13 +259,16 @@ def _candidates(
     """The weights to begin with as the paper does; None for fresh ones."""
     if options.candidates == 1:
         return None
-    weights, earned = select_initial_weights(
-        configuration, options.candidates, options.candidate_episodes, device=options.device
-    )
+    episodes = options.candidate_episodes
+    with make_progress(console, "initial weights") as progress:
+        track = partial(progress.track, total=episodes)
+        weights, earned = select_initial_weights(
+            configuration, options.candidates, episodes, device=options.device, track=track
+        )
     reached = ", ".join(f"{value:.1f}" for value in earned)
     console.print(
         f"as in the paper, initial weights from {options.candidates} candidates per scheme "
-        f"after {options.candidate_episodes} episodes: {reached} bps/Hz"
+        f"after {episodes} episodes: {reached} bps/Hz"
     )
     return weights
 

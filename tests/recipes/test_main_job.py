@@ -1,6 +1,7 @@
 """The main job: over several layouts and horizons, and at its full length."""
 
 import json
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -9,6 +10,7 @@ import pytest
 from hyuav.figures.gallery import FIGURES
 from hyuav.runs import RunDirectory
 from hyuav.scenario import PRESETS
+from offline_wandb import history, offline_runs, recorded
 from recipe_calls import TINY, Call, Refusal
 
 JOB = [
@@ -47,6 +49,61 @@ def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
     paper = RunDirectory(job / "as_in_paper").metrics()
     assert len(paper) == 4 * 6
     assert set(paper["num_slots"]) == {8}
+
+
+def test_all_of_a_job_is_one_group_and_its_parts_are_named_after_it(
+    call: Call, tmp_path: Path
+) -> None:
+    call(
+        "reproduce",
+        *JOB,
+        *("num_slots=10", "also=random_disk", "figures=learning_curves", "logger.mode=offline"),
+    )
+    job = tmp_path / "job"
+    places = (job, *(job / name for name in ("as_in_paper", "random_disk", "horizons/T10")))
+    files = [file for place in places for file in offline_runs(place)]
+    runs = [recorded(file, "run")[0] for file in files]
+    assert sorted((run.job_type, run.display_name) for run in runs) == [
+        ("evaluate", "job"),
+        ("evaluate", "job/horizons/T10"),
+        ("evaluate", "job/random_disk"),
+        ("train", "job"),
+        ("train", "job/as_in_paper"),
+        ("train", "job/random_disk"),
+    ]
+    assert {run.run_group for run in runs} == {"job"}
+    assert json.loads((job / "as_in_paper" / "wandb.json").read_text())["group"] == "job"
+    assert all(
+        "schemes/path" in history(file)[-1]
+        for file, run in zip(files, runs, strict=True)
+        if run.job_type == "evaluate"
+    )
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_terminal_shows_progress_of_all_that_takes_time_and_a_pipe_gets_none(
+    call: Call,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    terminal: bool,
+) -> None:
+    if terminal:
+        for name, value in (("TTY_COMPATIBLE", "1"), ("TTY_INTERACTIVE", "1"), ("COLUMNS", "100")):
+            monkeypatch.setenv(name, value)
+    candidates = ("candidates=2", "candidate_episodes=3")
+    call("reproduce", *JOB, *candidates, "figures=[learning_curves,energy]")
+    written = capsys.readouterr().out
+    told = re.sub(r"\x1b\[[\d;?]*\w", "", written)
+    for task, total in (
+        ("initial weights", 3),
+        ("training", 4),
+        ("optima", 3),
+        ("evaluating", 11),
+        ("figures", 2),
+        ("reports", 1),
+    ):
+        assert bool(re.search(rf"{task} \S* *{total}/{total} ", told)) == terminal, task
+    assert ("0:00:00 left" in told) == ("\x1b" in written) == terminal
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Where a training reports to: its run directory, Weights & Biases and the terminal."""
 
 from hyuav.tracking.parameters import EvaluationLoggerParameters, LoggerParameters
-from hyuav.tracking.reports import in_group, log_comparison, log_evaluation
+from hyuav.tracking.reports import in_group, log_comparison, log_evaluation, part_of
 from hyuav.tracking.session import Session
 from hyuav.tracking.tracker import Tracker, learner_names
 
@@ -14,4 +14,5 @@ __all__ = [
     "learner_names",
     "log_comparison",
     "log_evaluation",
+    "part_of",
 ]

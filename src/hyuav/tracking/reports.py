@@ -12,7 +12,7 @@ from rich.console import Console
 
 from hyuav.evaluation import LABELS, Evaluation
 from hyuav.runs import REPORT_FILE, RunDirectory
-from hyuav.tracking.parameters import AS_TRAINED, LoggerParameters
+from hyuav.tracking.parameters import AS_TRAINED, LONGEST, LoggerParameters
 from hyuav.tracking.session import Session, model_name, remembered
 
 if TYPE_CHECKING:
@@ -107,7 +107,23 @@ def log_comparison(
 
 def in_group(logger: LoggerParameters, directory: Path) -> LoggerParameters:
     """The same, in the group that is called as the directory where the logger names none."""
-    return dataclasses.replace(logger, group=logger.group or directory.resolve().name)
+    group = logger.group or directory.resolve().name[-LONGEST:]
+    return dataclasses.replace(logger, group=group)
+
+
+def part_of(logger: LoggerParameters, job: Path, directory: Path) -> LoggerParameters:
+    """The same for a training or an evaluation that a job keeps in a directory.
+
+    Args:
+        logger: of the whole job. An id that it asks for is that of the run in the job's directory.
+        job: directory of the job, which its group is called as.
+        directory: the job's or one within, which stands behind the job's in the name.
+    """
+    within = directory.resolve().relative_to(job.resolve())
+    name = Path(logger.name or job.resolve().name, within).as_posix()
+    of_job = in_group(logger, job)
+    own_id = None if within.parts else logger.id
+    return dataclasses.replace(of_job, name=name[-LONGEST:], id=own_id)
 
 
 def _beside(logger: LoggerParameters, training: Mapping[str, Any]) -> LoggerParameters:
