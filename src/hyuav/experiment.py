@@ -122,6 +122,8 @@ def _train(
     with Interruption() as interruption:
         try:
             with Tracker(run, configuration, training, logger, console, logs, reported) as tracker:
+                if training.is_finished:
+                    tracker.save()  # the best weights may be damaged
                 for episode in training.episodes():
                     tracker.log(episode)
                     if interruption.requested:

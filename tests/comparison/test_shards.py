@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from hyuav.comparison.plan import PEER, parameters_of, training_episodes
 from hyuav.comparison.shards import Shard, tables
 from hyuav.errors import BusyError, InputError
 from hyuav.evaluation import EvaluationParameters, Policy, fly
-from hyuav.experiment import new_training
+from hyuav.experiment import new_training, train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.runs import RunConfiguration, RunDirectory
@@ -138,6 +139,7 @@ def test_a_shard_of_this_project_is_a_run(optima: Optima, tmp_path: Path) -> Non
     work = shard(optima, tmp_path)
     work.run()
     assert RunDirectory(work.path).configuration() == work.configuration
+    assert [file.name for file in (work.path / "checkpoints").iterdir()] == ["best.pt"]
     results = pd.read_parquet(work.path / "results.parquet")
     weights = RunDirectory(work.path).best_weights()
     last = LearnedPolicy(SCENARIO, work.configuration.algorithm, weights, 3)
@@ -210,6 +212,92 @@ def test_learners_that_stop_count_with_their_last_good_weights(
         assert np.isfinite(learner["sum_rate"])
         own = curves[(curves["scheme"] == learner["scheme"]) & (curves["seed"] == learner["seed"])]
         assert own["episode"].tolist() == ([2] if flown else [])
+
+
+@pytest.fixture(scope="module")
+def finished(optima: Optima, tmp_path_factory: pytest.TempPathFactory) -> Shard:
+    work = shard(optima, tmp_path_factory.mktemp("finished"))
+    work.run()
+    return work
+
+
+def cut(file: Path, share: float = 0.6) -> None:
+    file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
+
+
+def assert_as_before(work: Shard, before: Shard) -> None:
+    """The tables are whole, and the same but for the clock."""
+    kept, expected = work.kept(), before.kept()
+    assert kept is not None
+    assert expected is not None
+    for own, other in zip(kept, expected, strict=True):
+        clock = [column for column in own.columns if column.startswith("seconds")]
+        pd.testing.assert_frame_equal(
+            own.drop(columns=clock), other.drop(columns=clock), check_exact=True
+        )
+
+
+@pytest.mark.parametrize("damage", ["cut", "empty", "missing", "foreign"])
+@pytest.mark.parametrize("name", ["results.parquet", "curves.parquet"])
+def test_damaged_tables_are_made_anew_from_the_weights(
+    finished: Shard, tmp_path: Path, name: str, damage: str
+) -> None:
+    work = dataclasses.replace(finished, parent=tmp_path)
+    shutil.copytree(finished.path, work.path)
+    file, weights = work.path / name, work.path / "checkpoints" / "best.pt"
+    if damage == "cut":
+        cut(file)
+    elif damage == "empty":
+        file.write_bytes(b"")
+    elif damage == "missing":
+        file.unlink()
+    else:
+        pd.DataFrame({"seed": range(4)}).to_parquet(file)
+    os.utime(weights, (1.0, 1.0))
+    assert not work.is_finished
+    work.run()
+    assert_as_before(work, finished)
+    assert weights.stat().st_mtime == 1.0  # not trained again
+
+
+@pytest.mark.parametrize("damaged", ["checkpoints/best.pt", "metrics.csv", "config.yaml"])
+def test_what_cannot_be_evaluated_again_is_trained_again(
+    finished: Shard, tmp_path: Path, damaged: str
+) -> None:
+    work = dataclasses.replace(finished, parent=tmp_path)
+    shutil.copytree(finished.path, work.path)
+    cut(work.path / damaged)
+    (work.path / "curves.parquet").unlink()
+    work.run()
+    assert_as_before(work, finished)
+    assert [path.name for path in tmp_path.iterdir()] == [work.name]
+
+
+def test_best_weights_that_are_damaged_come_back_from_the_last_checkpoint(
+    finished: Shard, tmp_path: Path
+) -> None:
+    work = dataclasses.replace(finished, parent=tmp_path)
+    partial = tmp_path / f"{work.name}.partial"
+    run = train(partial, work.configuration, work.logger, Console(quiet=True))
+    cut(run.best_checkpoint)
+    os.utime(run.config_file, (1.0, 1.0))
+    work.run()
+    assert_as_before(work, finished)
+    assert (work.path / "config.yaml").stat().st_mtime == 1.0  # not begun again
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_a_damaged_optimum_is_none(optima: Optima, tmp_path: Path, share: float) -> None:
+    assert optima.is_solved
+    damaged = dataclasses.replace(optima, file=tmp_path / "campus.parquet")
+    assert not damaged.is_solved
+    shutil.copy(optima.file, damaged.file)
+    assert damaged.is_solved
+    assert not dataclasses.replace(damaged, horizons=(6, 9)).is_solved
+    cut(damaged.file, share)
+    assert not damaged.is_solved
+    with pytest.raises(InputError, match=r"campus\.parquet': expected best flights in Parquet \("):
+        damaged.policy("relay", 6)
 
 
 @pytest.mark.parametrize("left", ["another", "nothing", "damaged"])

@@ -82,6 +82,20 @@ def test_only_what_is_missing_is_done_again(call: Call, tmp_path: Path, capsys: 
     assert [file.stat().st_mtime_ns for file in kept] == written
 
 
+def test_what_is_damaged_is_told_and_made_anew(call: Call, tmp_path: Path, capsys: Printed) -> None:
+    call("compare", *TWO)
+    here, before = tmp_path / "here", capsys.readouterr().out
+    shard, optimum = here / "shards/sac_two_clusters_T8", here / "optima/two_clusters.parquet"
+    for file in (shard / "curves.parquet", optimum):
+        file.write_bytes(file.read_bytes()[:100])
+    call("compare", *TWO)
+    again = capsys.readouterr()
+    assert again.out == before
+    assert again.err.splitlines() == [
+        f"{damaged}: damaged or incomplete, and made anew" for damaged in (optimum, shard)
+    ]
+
+
 def test_a_shard_that_fails_is_named_and_tried_again(
     call: Call, tmp_path: Path, capsys: Printed
 ) -> None:

@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 
 from hyuav.comparison.optima import Optima
 from hyuav.comparison.plan import PEER, PLAIN, Compare, parameters_of, training_episodes
-from hyuav.comparison.shards import CURVES_FILE, RESULTS_FILE, Shard
+from hyuav.comparison.shards import Shard
 from hyuav.comparison.statistics import (
     LAYOUTS,
     improvements,
@@ -167,12 +167,10 @@ class ComparisonDirectory:
 
     def summary(self) -> Summary | None:
         """Of the shards that are finished; None where none is."""
-        finished = [shard.path for shard in self.shards if shard.is_finished]
+        finished = [kept for shard in self.shards if (kept := shard.kept()) is not None]
         if not finished:
             return None
-        results, curves = (
-            _joined([path / name for path in finished]) for name in (RESULTS_FILE, CURVES_FILE)
-        )
+        results, curves = map(_joined, zip(*finished, strict=True))
         threshold = self.options.threshold
         on_layouts = results[in_cells(results)["scenario"] == LAYOUTS]
         return Summary(
@@ -185,9 +183,8 @@ class ComparisonDirectory:
         )
 
 
-def _joined(files: Sequence[Path]) -> pd.DataFrame:
+def _joined(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """The rows of all tables; one without rows tells nothing of its columns' types."""
-    tables = [pd.read_parquet(file) for file in files]
     return pd.concat([own for own in tables if len(own)] or tables, ignore_index=True)
 
 

@@ -1,13 +1,16 @@
 """The best flights of a scenario, solved once and kept in a file."""
 
+import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 import torch
+from pyarrow.lib import ArrowException
 
 from hyuav.durable import write_durably
-from hyuav.evaluation import Policy
+from hyuav.errors import InputError, one_line, rejection
+from hyuav.evaluation import OPTIMA, Policy
 from hyuav.scenario import Scenario
 from hyuav.schemes.optimum import FlightPolicy, solve_horizons
 
@@ -26,6 +29,17 @@ class Optima:
     resolution: float
     """Of the grid in m."""
     file: Path
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether the file holds every flight whole."""
+        try:
+            whole = self._flights().dropna(subset=["x", "y"])
+        except InputError:
+            return False
+        lengths = whole.groupby(["scheme", "num_slots"]).size()
+        every = itertools.product(OPTIMA, self.horizons)
+        return all(lengths.get((scheme, num_slots)) == num_slots + 1 for scheme, num_slots in every)
 
     def solve(self) -> None:
         """Find the flights and write the file."""
@@ -48,8 +62,20 @@ class Optima:
         write_durably(self.file, pd.concat(flights, ignore_index=True).to_parquet())
 
     def policy(self, scheme: str, num_slots: int) -> Policy:
-        """The way to fly the best flight of a scheme over a horizon."""
-        flights = pd.read_parquet(self.file)
+        """The way to fly the best flight of a scheme over a horizon.
+
+        Raises:
+            InputError: the file is missing or damaged.
+        """
+        flights = self._flights()
         flight = flights[(flights["scheme"] == scheme) & (flights["num_slots"] == num_slots)]
         path = torch.tensor(flight.sort_values("slot")[["x", "y"]].to_numpy())
         return Policy(FlightPolicy(path, self.scenario))
+
+    def _flights(self) -> pd.DataFrame:
+        columns = ["scheme", "num_slots", "value", "standard_error", "slot", "x", "y"]
+        try:
+            return pd.read_parquet(self.file)[columns]
+        except (OSError, LookupError, ValueError, ArrowException) as error:
+            accepted = f"best flights in Parquet ({one_line(str(error))})"
+            raise InputError(rejection("optima", str(self.file), accepted)) from None

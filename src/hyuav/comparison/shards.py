@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from pyarrow.lib import ArrowException
 from rich.console import Console
 
 from hyuav.comparison.optima import Optima
@@ -16,10 +17,18 @@ from hyuav.durable import rename_durably, write_durably
 from hyuav.errors import BusyError, Halted, InputError, rejection
 from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
 from hyuav.experiment import LEARNED, learned_policies, resume, train
-from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.runs import METRIC_COLUMNS, RunConfiguration, RunDirectory
 from hyuav.tracking import LoggerParameters, in_group
 
-RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
+TABLES = RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
+
+_NUMBERS = {*METRIC_COLUMNS} - {"scheme"}
+_IDENTITY = {"algorithm", "scenario", "scheme", "num_slots", "seed"}
+_RESULTS = _IDENTITY | {
+    *("sum_rate", "optimum", "fraction", "seconds"),
+    *("episodes_to_threshold", "seconds_to_threshold"),
+}
+_CURVES = _IDENTITY | {"episode", "slots", "seconds", "best_sum_rate", "fraction"}
 
 
 @dataclass(frozen=True)
@@ -57,17 +66,37 @@ class Shard:
     @property
     def is_finished(self) -> bool:
         """Whether nothing is left to do."""
-        return (self.path / RESULTS_FILE).is_file()
+        return self.kept() is not None
+
+    def kept(self) -> tuple[pd.DataFrame, pd.DataFrame] | None:
+        """Both tables, as :func:`tables` gave them; None where one is missing or damaged."""
+        try:
+            results, curves = (pd.read_parquet(self.path / name) for name in TABLES)
+        except (OSError, ValueError, ArrowException):
+            return None
+        learners = len(self.configuration.learners)
+        whole = len(results) == learners and set(results) >= _RESULTS and set(curves) >= _CURVES
+        return (results, curves) if whole else None
 
     def run(self) -> None:
         """Train, evaluate and keep everything; a broken attempt goes on from its checkpoint.
 
+        Where all was kept and the tables are damaged, only they are made anew if the best weights
+        and the metrics are whole.
+
         Raises:
             InputError: a scheme's optimum earns nothing, or another process trains there.
+            OSError: something cannot be written, for want of space perhaps.
         """
         for scheme in dict.fromkeys(own.scheme for own in self.configuration.learners):
             _optimum(self, scheme, self.evaluation)
+        if _has_ended(self, RunDirectory(self.path)):
+            self._keep(self.path, *_reached(self, RunDirectory(self.path)))
+            return
         partial = self.path.with_name(f"{self.name}.partial")
+        if self.path.exists():  # and is damaged, but may hold a checkpoint
+            _clear(partial)
+            self.path.rename(partial)
         if self.entry == PEER:
             from hyuav.comparison import stable_baselines  # needs a library that is optional
 
@@ -77,10 +106,15 @@ class Shard:
         else:
             _train(self, partial)
             metrics, sum_rates = _reached(self, RunDirectory(partial))
-        results, curves = tables(self, metrics, sum_rates)
-        write_durably(partial / CURVES_FILE, curves.to_parquet())
-        write_durably(partial / RESULTS_FILE, results.to_parquet())
+        self._keep(partial, metrics, sum_rates)
         rename_durably(partial, self.path)
+        finished = RunDirectory(self.path)
+        for checkpoint in (finished.previous_checkpoint, finished.last_checkpoint):
+            checkpoint.unlink(missing_ok=True)  # nothing goes on from them any more
+
+    def _keep(self, directory: Path, metrics: pd.DataFrame, sum_rates: list[float]) -> None:
+        for name, table in zip(TABLES, tables(self, metrics, sum_rates), strict=True):
+            write_durably(directory / name, table.to_parquet())
 
 
 def _clear(directory: Path) -> None:
@@ -111,6 +145,30 @@ def _go_on(shard: Shard, directory: Path) -> bool:
     except InputError:  # no checkpoint yet, or one that cannot be read
         return False
     return True
+
+
+def _has_ended(shard: Shard, run: RunDirectory) -> bool:
+    """Whether a run holds the shard's training to its end, with weights that can be flown.
+
+    A learner that stopped cannot be told from one whose last rows were cut off: that is no end.
+    """
+    configuration, training = shard.configuration, shard.configuration.training
+    try:
+        if _comparable(run.configuration()) != _comparable(configuration):
+            return False
+        learned_policies([run], configuration.scenario)
+        rows = run.metrics()
+    except (OSError, ValueError):  # a refusal among them
+        return False
+    if not set(rows.select_dtypes("number")) >= _NUMBERS:
+        return False
+    last = rows["episode"] == training.num_episodes
+    evaluated = rows[last | (rows["episode"] % training.evaluation_every == 0)]
+    flown = rows.drop_duplicates(["learner", "episode"])
+    return (
+        len(rows) == len(flown) == len(configuration.learners) * training.num_episodes
+        and not evaluated[[*_NUMBERS]].isna().to_numpy().any()
+    )
 
 
 def _comparable(configuration: RunConfiguration) -> RunConfiguration:
