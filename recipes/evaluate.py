@@ -16,7 +16,7 @@ from rich.console import Console
 
 from hyuav.configuration import Config, recipe, section
 from hyuav.errors import InputError, rejection
-from hyuav.evaluation import EvaluationParameters, evaluate
+from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE, EvaluationParameters, evaluate
 from hyuav.experiment import learned_policies, print_results, reference_policies
 from hyuav.figures import save_flight_map
 from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text, thread_count
@@ -66,6 +66,9 @@ def main(config: Config, _: Path) -> None:
     console = Console()
     output = runs[0].path if options.output is None else Path(options.output)
     require_writable("output", output / "figures")
+    for name in (EVALUATION_FILE, FLIGHTS_FILE):
+        if (output / name).is_dir():
+            raise InputError(rejection(name, str(output / name), "a file or none, not a directory"))
     policies = {
         **learned_policies(runs, scenario),
         **reference_policies(scenario, parameters.resolution, console),

@@ -116,14 +116,52 @@ def test_an_evaluation_over_another_horizon_bounds_no_curve(
     assert pd.read_csv(run.figures / "learning_curves.csv")["optimum"].isna().all()
 
 
+@pytest.mark.parametrize("damage", ["cut", "[1]", "{}", "a directory"])
 def test_an_evaluation_that_cannot_be_read_is_named(
-    run: RunDirectory, evaluation: Evaluation
+    run: RunDirectory, evaluation: Evaluation, damage: str
 ) -> None:
     evaluation.save(run.path)
-    text = json.dumps(evaluation.summary)
-    (run.path / "evaluation.json").write_text(text[:50])
-    with pytest.raises(InputError, match=r"evaluation\.json: expected an evaluation in JSON"):
-        draw(run, ["trajectories"], console())
+    file = run.path / "evaluation.json"
+    if damage == "a directory":
+        file.unlink()
+        file.mkdir()
+    else:
+        file.write_text(json.dumps(evaluation.summary)[:50] if damage == "cut" else damage)
+    for name in ("trajectories", "horizons", "learning_curves"):
+        with pytest.raises(InputError, match=r"evaluation\.json: expected an evaluation in JSON"):
+            draw(run, [name], console())
+
+
+@pytest.mark.parametrize("damage", ["cut", "another table", "a directory"])
+def test_flights_that_cannot_be_read_are_named(
+    run: RunDirectory, evaluation: Evaluation, damage: str
+) -> None:
+    evaluation.save(run.path)
+    file = run.path / "flights.parquet"
+    if damage == "cut":
+        file.write_bytes(file.read_bytes()[:500])
+    elif damage == "another table":
+        pd.DataFrame({"scheme": ["proposed"]}).to_parquet(file)
+    else:
+        file.unlink()
+        file.mkdir()
+    for name in ("trajectories", "flight_map", "energy", "offloading", "animation"):
+        with pytest.raises(InputError, match=r"flights\.parquet: expected flights in Parquet"):
+            draw(run, [name], console())
+
+
+@pytest.mark.parametrize("damage", ["cut", "spoilt", "a directory"])
+def test_of_damaged_metrics_what_can_be_read_is_drawn(run: RunDirectory, damage: str) -> None:
+    content = run.metrics_file.read_bytes()
+    run.metrics_file.unlink()
+    if damage == "a directory":
+        run.metrics_file.mkdir()
+        with pytest.raises(InputError, match=r"no learner has the scenario's T = 10"):
+            draw(run, ["learning_curves"], console())
+        return
+    run.metrics_file.write_bytes(content[:-20] + (b"\0,what,is\nthis" * (damage == "spoilt")))
+    draw(run, ["learning_curves"], console())
+    assert drawn(run) == {"learning_curves"}
 
 
 def test_runs_within_are_drawn_too_and_the_papers_algorithm_beside(

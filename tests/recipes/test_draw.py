@@ -23,6 +23,21 @@ def test_figures_are_drawn_from_a_finished_run(
     assert printed.endswith("figures: run/figures\n")
 
 
+@pytest.mark.parametrize("name", ["evaluation.json", "flights.parquet"])
+def test_a_directory_where_a_result_belongs_is_answered_by_one_line(
+    call: Call, refusal: Refusal, tmp_path: Path, name: str
+) -> None:
+    call("train", "hydra.run.dir=run", *TINY)
+    (tmp_path / "run" / name).mkdir()
+    line = f"{name} = 'run/{name}': expected a file or none, not a directory"
+    assert line in refusal("evaluate", "run=run")
+    (tmp_path / "run" / name).rename(tmp_path / "elsewhere")
+    call("evaluate", "run=run", "evaluation.episodes=4", "evaluation.resolution=10")
+    (tmp_path / "run" / name).unlink()
+    (tmp_path / "elsewhere").rename(tmp_path / "run" / name)
+    assert f"run/{name}: expected " in refusal("draw", "run=run", "figures=[animation]")
+
+
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [

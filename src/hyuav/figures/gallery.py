@@ -1,7 +1,6 @@
 """Every figure that the files of a finished run allow, drawn from them alone."""
 
 import dataclasses
-import json
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -32,7 +31,8 @@ from hyuav.figures.over_time import (
     offloading_table,
 )
 from hyuav.figures.style import COMPARED, save_figure, save_tables
-from hyuav.runs import RunDirectory
+from hyuav.report.reading import readable_evaluation, readable_flights
+from hyuav.runs import RunDirectory, readable_metrics
 from hyuav.scenario import Scenario
 from hyuav.terminal import make_progress, print_line
 
@@ -61,20 +61,22 @@ class Finished:
         """A few flights of each scheme, a row per slot.
 
         Raises:
-            InputError: no scheme was evaluated.
+            InputError: no scheme was evaluated, or the file is damaged.
         """
         file = self._existing(FLIGHTS_FILE)
-        try:
-            return pd.read_parquet(file)
-        except (OSError, ValueError) as error:
-            raise InputError(f"{file}: expected flights in Parquet ({error})") from None
+        flights = readable_flights(self.run.path)
+        if flights is None:
+            raise InputError(
+                f"{file}: expected flights in Parquet (recipes/evaluate.py makes them)"
+            )
+        return flights
 
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The evaluation over the scenario's own horizon, or whichever was asked for last.
 
         Raises:
-            InputError: there is none.
+            InputError: there is none, or the file is damaged.
         """
         return _read(self._existing(EVALUATION_FILE))
 
@@ -130,11 +132,10 @@ class Finished:
 
 
 def _read(file: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{file}: expected an evaluation in JSON ({error})") from None
-    return dict(content)
+    content = readable_evaluation(file.parent)
+    if content is None:
+        raise InputError(f"{file}: expected an evaluation in JSON (recipes/evaluate.py makes it)")
+    return content
 
 
 def _learning_curves(finished: Finished, directory: Path, name: str) -> None:
@@ -142,11 +143,12 @@ def _learning_curves(finished: Finished, directory: Path, name: str) -> None:
     for training, run in finished.trainings().items():
         if not run.metrics_file.exists():
             raise InputError(f"there is no {run.metrics_file.name} in {run.path}")
-        metrics = run.metrics()
+        metrics = readable_metrics(run.metrics_file)
         own = metrics[metrics["num_slots"] == finished.scenario.num_slots]
         rewards = {
             LEARNED[str(rule)]: rows.pivot_table("accumulated_reward", "episode", "learner")
             for rule, rows in own.groupby("scheme")
+            if rule in LEARNED
         }
         if rewards:
             tables.append(learning_table(rewards, finished.optima(), training))
