@@ -1,12 +1,13 @@
 """The report of a comparison: how near to the optimum each algorithm comes."""
 
-from collections.abc import Iterator, Mapping
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
-from hyuav.comparison.plan import LAYOUT
+from hyuav.comparison.plan import LAYOUT, Compare
 from hyuav.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.comparison.statistics import summarize_algorithms, summarize_cells
 from hyuav.comparison.tables import label, stopped
@@ -35,12 +36,12 @@ _FEW = EvaluationParameters(episodes=2, flights=1)
 def comparison_page(directory: Path) -> Page:
     """What a comparison's directory tells, however much of it is there yet."""
     config = readable_config(directory)
-    threshold = _threshold(config)
+    threshold, asked = _threshold(config), _Asked.of(config)
     results, curves = (
-        _rows(directory, name, columns)
+        _rows(directory, name, columns, asked)
         for name, columns in ((RESULTS_FILE, _RESULTS), (CURVES_FILE, _CURVES))
     )
-    runs = sorted(_trained(directory), key=_order)
+    runs = sorted(_trained(directory), key=asked.flown)
     sections = [
         *_results(results, curves, threshold),
         _flights(runs[:MAX_FLIGHTS]),
@@ -61,10 +62,55 @@ def _threshold(config: Mapping[str, Any]) -> float:
     return float(value) if isinstance(value, int | float) and 0 <= value <= 1 else 0.97
 
 
-def _rows(directory: Path, name: str, columns: set[str]) -> pd.DataFrame | None:
+class _Asked(NamedTuple):
+    """The order in which a comparison was asked for; what is unknown comes last."""
+
+    entries: Sequence[str] = ()
+    scenarios: Sequence[str] = ()
+    horizons: Sequence[int] = ()
+
+    @classmethod
+    def of(cls, config: Mapping[str, Any]) -> "_Asked":
+        """Of a comparison's ``config.yaml``, which may be damaged or of another version."""
+        names = [field.name for field in dataclasses.fields(Compare)]
+        try:
+            asked = Compare.from_dict({name: config[name] for name in names if name in config})
+        except InputError:
+            return cls()
+        return cls(asked.entries, asked.scenario, asked.num_slots)
+
+    def place(self, table: pd.DataFrame) -> tuple[int, int, int]:
+        """Of a training's table."""
+        algorithm, scenario, num_slots = table[["algorithm", "scenario", "num_slots"]].iloc[0]
+        return (
+            _index(self.entries, algorithm),
+            _index(self.scenarios, scenario),
+            _index(self.horizons, num_slots),
+        )
+
+    def flown(self, trained: tuple[str, RunDirectory, RunConfiguration]) -> tuple[Any, ...]:
+        """Of a training's flight: the longest horizons first, and presets before layouts."""
+        entry, _, configuration = trained
+        name = configuration.scenario_name
+        return (
+            name.startswith(LAYOUT),
+            -configuration.scenario.num_slots,
+            _index(self.scenarios, name),
+            name,
+            _index(self.entries, entry),
+        )
+
+
+def _index(values: Sequence[Any], value: object) -> int:
+    told = [str(own) for own in values]
+    return told.index(str(value)) if str(value) in told else len(told)
+
+
+def _rows(directory: Path, name: str, columns: set[str], asked: _Asked) -> pd.DataFrame | None:
     """A table of all finished trainings, or what was gathered of them."""
     paths = [path / name for path in _finished(directory)] or [directory / name]
-    tables = [table for path in paths if (table := readable_table(path, columns)) is not None]
+    read = (readable_table(path, columns) for path in paths)
+    tables = sorted((table for table in read if table is not None), key=asked.place)
     return pd.concat(tables, ignore_index=True) if tables else None
 
 
@@ -99,12 +145,6 @@ def _trained(directory: Path) -> Iterator[tuple[str, RunDirectory, RunConfigurat
         entry = path.name.partition(f"_{configuration.scenario_name}{horizon}")[0]
         if run.best_checkpoint.is_file():
             yield entry, run, configuration
-
-
-def _order(trained: tuple[str, RunDirectory, RunConfiguration]) -> tuple[bool, int, str, str]:
-    entry, _, configuration = trained
-    name = configuration.scenario_name
-    return name.startswith(LAYOUT), -configuration.scenario.num_slots, name, entry
 
 
 def _scenarios(
