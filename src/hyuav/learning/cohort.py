@@ -17,6 +17,7 @@ from hyuav.learning.repetition import as_planned
 from hyuav.learning.replay import clear_unused, forget, latest, make_replay
 from hyuav.learning.search import FlightSearch
 from hyuav.learning.slots import CompiledSlots
+from hyuav.learning.state import with_own_memory
 from hyuav.learning.weights import (
     copy_weights,
     draw_weights,
@@ -337,11 +338,15 @@ class Cohort:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Continue where :meth:`state_dict` was taken, in a cohort made with the same arguments."""
+        """Continue where :meth:`state_dict` was taken, in a cohort made with the same arguments.
+
+        Args:
+            state: that :func:`hyuav.learning.state.require_state` accepts.
+        """
         self._compiled = None  # its programs hold the optimizers' former tensors
         self.algorithm.modules.load_state_dict(state["modules"])
         for step, optimizer in zip(self.algorithm.steps, state["optimizers"], strict=True):
-            step.optimizer.load_state_dict(optimizer)
+            step.optimizer.load_state_dict(with_own_memory(optimizer))
         self.replay.load_state_dict(state["replay"])
         self.collector._carrier.update(state["slot"])
         self.env.base_env.draws.set_state(state["environment"])
@@ -351,7 +356,8 @@ class Cohort:
         self.best_evaluation = state["best_evaluation"].to(self.env.device)
         self.stopped = state["stopped"].to(self.env.device)
         self.best_weights = {
-            name: values.to(self.env.device) for name, values in state["best_weights"].items()
+            name: values.to(self.env.device)
+            for name, values in with_own_memory(state["best_weights"]).items()
         }
 
 

@@ -17,8 +17,17 @@ from hyuav.errors import InputError, InputTypeError, one_line, rejection
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.cohort import Cohort, Earned, Learner
 from hyuav.learning.memory import require_memory
+from hyuav.learning.state import require_entries, require_like, require_state
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
-from hyuav.parameters import Parameters, choice, count, number, parameter, thread_count
+from hyuav.parameters import (
+    Parameters,
+    choice,
+    count,
+    number,
+    parameter,
+    switch,
+    thread_count,
+)
 from hyuav.recording import COMPILATION_ERRORS, cores, has_compiler
 from hyuav.scenario import Scenario
 
@@ -329,12 +338,19 @@ class Training:
         """Continue where :meth:`state_dict` was taken, in a training made with the same arguments.
 
         Raises:
-            InputError: the state is of another algorithm, learner axis or scenario.
+            InputError: the state is of another algorithm, learner axis or scenario, or damaged; the
+                line names the entry. The training may then have taken some of it.
         """
         try:
-            for cohort, own in zip(self.cohorts, state["cohorts"], strict=True):
+            require_entries("training", state, ("cohorts", "can_compile"))
+            can_compile = switch("can_compile", state["can_compile"])
+            cohorts = list(zip(self.cohorts, state["cohorts"], strict=True))
+            for index, (cohort, own) in enumerate(cohorts):
+                require_state(f"cohorts[{index}]", own, cohort)
+                require_like(f"cohorts[{index}].episode", own["episode"], cohorts[0][1]["episode"])
+            for cohort, own in cohorts:
                 cohort.load_state_dict(own)
-            self._can_compile = bool(state["can_compile"])
+            self._can_compile = can_compile
         except (
             *(LookupError, RuntimeError, ValueError, TypeError, AttributeError),
             *(ArithmeticError, AssertionError),
