@@ -1,4 +1,5 @@
 import dataclasses
+import os
 from pathlib import Path
 
 import pytest
@@ -106,12 +107,41 @@ def test_an_algorithm_is_chosen_by_name() -> None:
 
 def test_metrics_can_be_read_while_they_are_written(tmp_path: Path) -> None:
     run = RunDirectory(tmp_path)
-    file = MetricsFile(run.metrics_file, ("episode", "evaluation"))
-    file.append([{"episode": 1}, {"episode": 2, "evaluation": 3.5}])
+    file = MetricsFile(run.metrics_file, METRIC_COLUMNS)
+    file.append([{"episode": 1, "scheme": "relay"}])
+    file.append([{"episode": 2, "scheme": "relay", "evaluation": 3.5}])
     table = run.metrics()
     assert table["episode"].tolist() == [1, 2]
     assert table["evaluation"].isna().tolist() == [True, False]
     file.close()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        *(b"", bytes(range(256)) * 20, b"a,b\n1,2\n"),
+        (",".join(METRIC_COLUMNS) + "\n1,20,0,best,3,20,1.5,,,,0.1\n").encode(),
+        (",".join(METRIC_COLUMNS) + "\n1,20,0,relay,3,20,high,,,,0.1\n").encode(),
+    ],
+)
+def test_metrics_that_no_training_wrote_are_refused_in_one_line(
+    tmp_path: Path, content: bytes
+) -> None:
+    (tmp_path / "metrics.csv").write_bytes(content)
+    with pytest.raises(InputError, match=r"^metrics = '[^\n]*: expected the table [^\n]*$"):
+        RunDirectory(tmp_path).metrics()
+
+
+def test_metrics_are_read_from_files_only(tmp_path: Path) -> None:
+    metrics = tmp_path / "metrics.csv"
+    os.mkfifo(metrics)
+    with pytest.raises(InputError, match="not a file"):
+        RunDirectory(tmp_path).metrics()
+    assert readable_metrics(metrics).empty
+    metrics.unlink()
+    metrics.mkdir()
+    with pytest.raises(InputError, match="not a file"):
+        RunDirectory(tmp_path).metrics()
 
 
 HEADER = ",".join((*METRIC_COLUMNS, "loss_critic"))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hyuav.durable import sync, write_all, write_durably
+from hyuav.files import read_regular
 from hyuav.runs import METRIC_COLUMNS
 
 
@@ -27,8 +28,7 @@ class MetricsPosition:
     def is_in(self, path: Path) -> bool:
         """Whether a file begins as it did."""
         try:
-            with path.open("rb") as file:
-                begun = file.read(self.size)
+            begun = read_regular(path, self.size)
         except OSError:
             begun = b""
         return len(begun) == self.size and zlib.crc32(begun) == self.checksum
@@ -47,7 +47,7 @@ def undamaged_metrics(path: Path, episodes: int) -> MetricsPosition:
     Raises:
         OSError: it cannot be written.
     """
-    lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
+    lines = read_regular(path).splitlines(keepends=True) if path.exists() else []
     width = len(lines[0].split(b",")) if lines else 0
     whole = [line for line in lines[1:] if _is_whole(line, width, episodes)]
     content = b"".join([*lines[:1], *whole])

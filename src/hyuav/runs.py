@@ -13,10 +13,12 @@ from typing import Any
 
 import pandas as pd
 from omegaconf import OmegaConf
+from pandas.api.types import is_numeric_dtype
 from torch import Tensor
 
 from hyuav.durable import create_durably
 from hyuav.errors import BusyError, InputError, rejection, require_choice
+from hyuav.files import open_regular, read_regular
 from hyuav.learning.algorithms import ALGORITHMS, AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
@@ -24,6 +26,7 @@ from hyuav.learning.training import TrainingParameters
 from hyuav.metrics import IDENTITY, parse_rows
 from hyuav.parameters import mapping, read_yaml, sequence
 from hyuav.scenario import PRESETS, Scenario
+from hyuav.system import SCHEMES
 
 REPORT_FILE = "report.html"
 
@@ -259,8 +262,29 @@ class RunDirectory:
         return load_weights_file(self.best_checkpoint)
 
     def metrics(self) -> pd.DataFrame:
-        """What training brought, a row per episode and learner."""
-        return pd.read_csv(self.metrics_file)
+        """What training brought, a row per episode and learner.
+
+        Raises:
+            InputError: there is no such table, or it is damaged.
+        """
+        numbers = [name for name in METRIC_COLUMNS if name != "scheme"]
+        try:
+            with open_regular(self.metrics_file) as file:
+                metrics = pd.read_csv(file)
+            whole = set(METRIC_COLUMNS) <= set(metrics.columns) and (
+                metrics.empty
+                or (
+                    all(map(is_numeric_dtype, metrics[numbers].dtypes))
+                    and metrics["scheme"].isin(SCHEMES).all()
+                )
+            )
+            reason = "" if whole else "damaged"
+        except (OSError, ValueError) as error:
+            reason = (error.strerror if isinstance(error, OSError) else "") or "damaged"
+        if reason:
+            accepted = f"the table that a training writes ({reason})"
+            raise InputError(rejection("metrics", str(self.metrics_file), accepted))
+        return metrics
 
 
 def readable_metrics(path: str | Path) -> pd.DataFrame:
@@ -273,7 +297,7 @@ def readable_metrics(path: str | Path) -> pd.DataFrame:
         path: of the file.
     """
     try:
-        content = Path(path).read_bytes() if Path(path).is_file() else b""  # a pipe never ends
+        content = read_regular(Path(path))
     except OSError:
         content = b""
     header, _, lines = content[: content.rfind(b"\n") + 1].partition(b"\n")

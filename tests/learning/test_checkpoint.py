@@ -73,6 +73,13 @@ def test_a_directory_is_not_a_checkpoint(tmp_path: Path) -> None:
     refusal(tmp_path)
 
 
+def test_neither_a_pipe_nor_a_device_is_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "endless").symlink_to("/dev/zero")
+    for path in (tmp_path / "pipe", tmp_path / "endless"):
+        assert "not a file" in refusal(path)
+
+
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
 def test_a_truncated_checkpoint_is_refused(tmp_path: Path, share: float) -> None:
     file = tmp_path / "last.pt"

@@ -1,5 +1,6 @@
 """Figures of a finished run, drawn again as a user asks for them."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -53,3 +54,30 @@ def test_a_mistake_is_answered_by_one_line(
     call("train", "hydra.run.dir=run", *TINY)
     assert line in refusal("draw", *arguments)
     assert not (tmp_path / "nowhere").exists()
+
+
+@pytest.mark.parametrize("damage", ["noise", "a directory", "a pipe"])
+def test_damaged_metrics_leave_a_figure_out_and_refuse_it_where_it_is_asked_for(
+    call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: str
+) -> None:
+    call("train", "hydra.run.dir=run", *TINY)
+    metrics = tmp_path / "run" / "metrics.csv"
+    metrics.unlink()
+    if damage == "noise":
+        metrics.write_bytes(bytes(range(256)) * 20)
+    elif damage == "a pipe":
+        os.mkfifo(metrics)
+    else:
+        metrics.mkdir()
+    line = "figure learning_curves: metrics = 'run/metrics.csv': expected the table"
+    assert line in refusal("draw", "run=run", "figures=learning_curves")
+    capsys.readouterr()
+    call("draw", "run=run")
+    assert "figure learning_curves is left out: metrics = " in capsys.readouterr().out
+
+
+def test_a_pipe_is_not_waited_for(call: Call, refusal: Refusal, tmp_path: Path) -> None:
+    call("train", "hydra.run.dir=run", *TINY)
+    os.mkfifo(tmp_path / "run" / "evaluation.json")
+    line = "figure energy: there is no evaluation.json in run"
+    assert line in refusal("draw", "run=run", "figures=energy")

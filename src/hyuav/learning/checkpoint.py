@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 
 from hyuav.durable import write_durably
-from hyuav.errors import InputError, rejection
+from hyuav.errors import InputError, brief, rejection
+from hyuav.files import read_regular
 
 FORMAT = "hyuav-checkpoint-1"
 
@@ -37,7 +38,8 @@ def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "c
     """Read what :func:`save_checkpoint` wrote under the same ``kind``.
 
     Raises:
-        InputError: no such file, a truncated, damaged or foreign one, or one of another kind.
+        InputError: no such file, a truncated, damaged or foreign one, one of another kind, or what
+            is there is no file but a pipe or a device.
     """
     accepted = f"a checkpoint of kind {kind!r} written by hyuav"
     try:
@@ -51,13 +53,13 @@ def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "c
     if not isinstance(stored, dict) or stored.get("format") != FORMAT:
         raise InputError(rejection("checkpoint", str(path), f"{accepted} (another program's)"))
     if stored.get("kind") != kind:
-        reason = f"this one is of kind {stored.get('kind')!r}"
+        reason = f"this one is of kind {brief(stored.get('kind'))}"
         raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})"))
     return stored.get("content")
 
 
 def _load(path: Path, device: torch.device | str) -> Any:
-    content = io.BytesIO(path.read_bytes())
+    content = io.BytesIO(read_regular(path))
     with zipfile.ZipFile(content) as archive:
         damaged = archive.testzip()  # PyTorch does not compare the checksums that it writes
     if damaged is not None:
