@@ -1,5 +1,6 @@
 import io
 import json
+import os
 import socket
 import sys
 from collections.abc import Iterator
@@ -9,8 +10,8 @@ import pytest
 import wandb
 from rich.console import Console
 
-from hyuav import InputError
 from hyuav.tracking import LoggerParameters, Session
+from hyuav.tracking.session import remembered
 from offline_wandb import history, offline_runs, recorded
 
 KEY = "0123456789abcdef0123456789abcdef01234567"
@@ -159,8 +160,20 @@ def told_of(home: Path) -> list[tuple[str, str]]:
     return found
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{", '{"id": 3}', "\x00"])
-def test_a_foreign_memory_is_refused_in_one_line(tmp_path: Path, content: str) -> None:
-    (tmp_path / "wandb.json").write_text(content)
-    with pytest.raises(InputError, match=r"^[^\n]*wandb\.json: expected [^\n]*$"):
-        open_session(tmp_path)
+@pytest.mark.parametrize("content", ["", "[]", "{", '{"id": 3}', "\x00", "[" * 10**5, "pipe"])
+def test_a_foreign_memory_is_told_of_and_the_run_is_a_new_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str
+) -> None:
+    file = tmp_path / "wandb.json"
+    os.mkfifo(file) if content == "pipe" else file.write_text(content)
+    with open_session(tmp_path, LoggerParameters(mode="disabled")) as session:
+        assert session.id is None
+    assert capsys.readouterr().err == ""
+    with open_session(tmp_path) as session:
+        session.log({"a": 1})
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == (
+        f"W&B: {file} is damaged: the run that it was for is not known, and cannot be continued"
+    )
+    assert remembered(tmp_path)["id"] == session.id
+    assert len(offline_runs(tmp_path)) == 1

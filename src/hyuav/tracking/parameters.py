@@ -28,7 +28,9 @@ def _label(longest: int, reserved: str = "") -> Converter:
     return convert
 
 
-_identifier = _label(LONGEST, f"{RESERVED};,'")
+identifier = _label(LONGEST, f"{RESERVED};,'")
+"""Accept what a W&B run can be known by."""
+
 _tags = one_or_more(_label(LONGEST_TAG), "a list of tags")
 
 
@@ -50,7 +52,7 @@ class LoggerParameters(Parameters):
     name: str | None = parameter(optional(_label(LONGEST)), None)
     """The directory's where it is None."""
     tags: tuple[str, ...] = parameter(_any_tags, ())
-    id: str | None = parameter(optional(_identifier), None)
+    id: str | None = parameter(optional(identifier), None)
     """Of the run, which is continued if there is one."""
 
 

@@ -18,12 +18,19 @@ import wandb
 from rich.console import Console
 
 from hyuav.durable import write_durably
-from hyuav.errors import InputError, harmless
+from hyuav.errors import harmless
+from hyuav.files import read_regular
 from hyuav.terminal import print_line
-from hyuav.tracking.parameters import LoggerParameters
+from hyuav.tracking.parameters import LoggerParameters, identifier
 
 MEMORY_FILE = "wandb.json"
 """In a run directory, which W&B run it belongs to."""
+
+IDENTITY = ("id", "mode", "project", "entity", "group")
+"""What it says of that run."""
+
+LARGEST_MEMORY = 2**16
+"""Bytes of it that are read."""
 
 SECONDS_TO_BEGIN, SECONDS_TO_FINISH = 30.0, 300.0
 """For which a server is waited for; what is not sent by then stays in the directory."""
@@ -63,8 +70,9 @@ class Session:
         self._job_type, self._console = job_type, console
         self._memory = memory
         self._run: wandb.Run | None = None
-        known = {} if memory is None or logger.id else remembered(memory)
-        self._id: str | None = logger.id or known.get("id")
+        self._id: str | None = logger.id
+        if memory is not None and self._id is None and logger.mode != "disabled":
+            self._id = remembered(memory).get("id")
 
     def __enter__(self) -> Self:
         if self._logger.mode != "disabled":
@@ -217,19 +225,20 @@ def _settings(mode: str) -> wandb.Settings:
 def remembered(directory: Path) -> dict[str, Any]:
     """Which W&B run a directory belongs to: id, mode, project, entity and group; empty if none.
 
-    Raises:
-        InputError: the file is not one that a session wrote.
+    Where the file is not one that a session wrote, that is told on the standard error, and none is
+    known.
     """
     file = directory / MEMORY_FILE
     try:
-        identity = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(read_regular(file, LARGEST_MEMORY).decode())
+        identity = {name: content[name] for name in IDENTITY}
+        identifier("id", identity["id"])
+        LoggerParameters.from_dict(identity)
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError):
-        raise InputError(f"{file}: expected what a run of Weights & Biases is known by") from None
-    texts = ("id", "mode", "project")
-    if not isinstance(identity, dict) or not all(isinstance(identity.get(n), str) for n in texts):
-        raise InputError(f"{file}: expected what a run of Weights & Biases is known by")
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        _say(f"{file} is damaged: the run that it was for is not known, and cannot be continued")
+        return {}
     return identity
 
 
