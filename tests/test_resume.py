@@ -3,8 +3,12 @@
 import dataclasses
 import io
 import math
+import os
+import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -14,6 +18,7 @@ from faults import small_disk
 from hyuav import InputError
 from hyuav.errors import Halted
 from hyuav.experiment import new_training, resume, train, train_or_resume
+from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from hyuav.runs import RunConfiguration, RunDirectory
 from hyuav.tracking.checkpoints import first_checkpoint
 from killed_training import OFF, differences, outcome, small
@@ -119,6 +124,156 @@ def test_without_a_whole_checkpoint_nothing_is_touched(run: RunDirectory) -> Non
     with pytest.raises(InputError, match=r"^last\.pt: checkpoint = .*: expected a checkpoint"):
         resume(run.path, OFF, SILENT)
     assert run.metrics_file.read_bytes() == before
+
+
+def rewritten(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """A whole checkpoint, with its right checksums, of other content."""
+    content = load_checkpoint(path, "training")
+    change(content)
+    save_checkpoint(path, "training", content)
+
+
+def put(*path: Any) -> Callable[[dict[str, Any]], object]:
+    """Replaces the entry at the path, whose last element is the new value."""
+    *before, last, odd = path
+
+    def change(content: dict[str, Any]) -> None:
+        for key in before:
+            content = content[key]
+        content[last] = odd
+
+    return change
+
+
+ODD: list[tuple[str, Callable[[dict[str, Any]], object]]] = [
+    (r"cohorts\[0\].episode", put("training", "cohorts", 0, "episode", math.nan)),
+    (r"cohorts\[1\].updates", put("training", "cohorts", 1, "updates", "many")),
+    (r"cohorts\[2\].best_weights", put("training", "cohorts", 2, "best_weights", {})),
+    (r"cohorts\[1\].episode", put("training", "cohorts", 1, "episode", 7)),
+    ("can_compile", put("training", "can_compile", 1)),
+    ("training", put("training", torch.zeros(2))),
+    ("reported", put("reported", torch.zeros(2))),
+    *(
+        ("reported.metrics.size", put("reported", "metrics", "size", odd))
+        for odd in ("a", -5, 1.5, 10**30)
+    ),
+    *(("reported.seconds", put("reported", "seconds", odd)) for odd in ("a", None, math.nan, -1.0)),
+    ("reported.wandb_id", put("reported", "wandb_id", 3)),
+    ("metrics.csv: not what it was", put("reported", "metrics", "size", 2**62)),
+]
+
+
+@pytest.mark.parametrize(("named", "change"), ODD)
+def test_a_whole_checkpoint_of_odd_content_is_told_of_and_the_one_before_goes_on(
+    run: RunDirectory,
+    unbroken: Path,
+    capsys: pytest.CaptureFixture[str],
+    named: str,
+    change: Callable[[dict[str, Any]], object],
+) -> None:
+    rewritten(run.last_checkpoint, change)
+    resume(run.path, OFF, SILENT)
+    assert differences(outcome(run.path), outcome(unbroken)) == []
+    reason, end = capsys.readouterr().err.splitlines()
+    assert re.search(named, reason)
+    assert "last.pt" in reason
+    assert end == "going on after episode 2"
+
+
+def test_where_no_checkpoint_fits_nothing_is_overwritten(run: RunDirectory) -> None:
+    for file in (run.last_checkpoint, run.previous_checkpoint):
+        rewritten(file, put("training", "cohorts", 0, "stopped", None))
+    cut(run.best_checkpoint, 0.5)
+    for damaged in (False, True):
+        if damaged:
+            spoil(run.metrics_file, line=2)
+        before = {path: path.read_bytes() for path in run.path.rglob("*") if path.is_file()}
+        with pytest.raises(InputError) as refused:
+            resume(run.path, OFF, SILENT)
+        assert "\n" not in str(refused.value)
+        after = {path: path.read_bytes() for path in run.path.rglob("*") if path.is_file()}
+        assert after == before
+
+
+def test_where_only_damaged_metrics_and_a_checkpoint_that_does_not_fit_are_left_that_is_told(
+    run: RunDirectory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rewritten(run.last_checkpoint, put("training", "cohorts", 0, "stopped", None))
+    spoil(run.metrics_file, line=2)
+    resume(run.path, OFF, SILENT)
+    told = capsys.readouterr().err
+    assert "last.pt" in told
+    assert "metrics.csv: its damaged rows are lost" in told
+    assert told.endswith("going on after episode 2\n")
+
+
+def fifo(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def endless(path: Path) -> None:
+    path.unlink()
+    path.symlink_to("/dev/zero")
+
+
+DAMAGES: dict[str, Callable[[Path], object]] = {
+    "cut off": lambda path: cut(path, 0.5),
+    "missing": lambda path: path.unlink(),
+    "a pipe": fifo,
+    "a link to a device": endless,
+    "of another network": lambda path: save_checkpoint(path, "weights", {"w": torch.zeros(1, 2)}),
+}
+
+
+@pytest.mark.parametrize("how", sorted(DAMAGES))
+@pytest.mark.parametrize("finished", [True, False])
+def test_damaged_best_weights_are_written_anew(
+    interrupted: Path,
+    unbroken: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    how: str,
+    finished: bool,
+) -> None:
+    source = unbroken if finished else interrupted
+    run = RunDirectory(shutil.copytree(source, tmp_path / "run"))
+    DAMAGES[how](run.best_checkpoint)
+    resume(run.path, OFF, SILENT)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("best.pt: ")
+    assert line.endswith("; written anew from the last checkpoint")
+    assert run.best_checkpoint.is_file()
+    assert differences(outcome(run.path), outcome(unbroken)) == []
+
+
+def test_a_pipe_in_the_place_of_the_last_checkpoint_is_not_waited_for(
+    run: RunDirectory, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fifo(run.last_checkpoint)
+    resume(run.path, OFF, SILENT)
+    assert differences(outcome(run.path), outcome(unbroken)) == []
+    assert "last.pt: checkpoint = " in capsys.readouterr().err
+
+
+def directory(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        *(("metrics.csv", damage) for damage in (fifo, endless, directory)),
+        *((f"checkpoints/{name}.pt", directory) for name in ("best", "last", "previous")),
+    ],
+)
+def test_what_is_in_the_way_is_refused(
+    run: RunDirectory, name: str, damage: Callable[[Path], object]
+) -> None:
+    damage(run.path / name)
+    with pytest.raises(InputError, match=rf"^{Path(name).name} = '[^\n]*: expected a file$"):
+        resume(run.path, OFF, SILENT)
 
 
 def test_a_full_disk_halts_a_training_which_goes_on_when_there_is_room(

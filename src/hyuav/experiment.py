@@ -100,10 +100,12 @@ def resume(
     """
     run = RunDirectory(directory)
     configuration = run.configuration()
-    training = new_training(configuration, device)
     require_writable("run directory", run.path)
     with run.reserved():
-        reported = restore(run, training)
+        try:
+            training, reported = restore(run, lambda: new_training(configuration, device))
+        except OSError as error:
+            raise Halted(f"nothing is done: {_cause(error)}") from error
         _train(run, configuration, training, logger, console, logs, reported)
     return run
 
@@ -133,13 +135,16 @@ def _train(
                     f"interrupted after episode {training.episode} of {episodes}"
                 )
         except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
-            line = f"halted after episode {training.episode} of {episodes}: {where}{error.strerror}"
+            line = f"halted after episode {training.episode} of {episodes}: {_cause(error)}"
             raise Halted(f"{line}; the last checkpoint is kept") from error
         interruption.raise_if_requested("interrupted after the last episode")
     if all(training.stopped):
         line = f"halted after episode {training.episode} of {episodes}: every learner has stopped"
         raise Halted(line, resumable=False)
+
+
+def _cause(error: OSError) -> str:
+    return f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror)
 
 
 def train_or_resume(

@@ -172,8 +172,12 @@ def test_a_training_that_goes_on_continues_the_same_run(tmp_path: Path) -> None:
     with run.metrics_file.open("a", newline="") as file:  # logged after the last checkpoint
         csv.writer(file).writerow([6, 120, 0, "hybrid", 0, 20, 1.0])
     longer = dataclasses.replace(CONFIGURATION.training, num_episodes=8)
-    again = Training(CONFIGURATION.scenario, training.learners, CONFIGURATION.algorithm, longer)
-    reported = restore(run, again)
+    again, reported = restore(
+        run,
+        lambda: Training(
+            CONFIGURATION.scenario, training.learners, CONFIGURATION.algorithm, longer
+        ),
+    )
     assert reported.wandb_id == remembered(run.path)["id"]
     (run.path / "wandb.json").unlink()  # it is in the checkpoint, too
     with Tracker(

@@ -2,15 +2,19 @@
 
 import dataclasses
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from hyuav.errors import InputError, harmless
+from hyuav.errors import InputError, harmless, rejection
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
+from hyuav.learning.state import require_entries, require_like
 from hyuav.learning.training import Training
 from hyuav.metrics_file import MetricsPosition, undamaged_metrics
+from hyuav.parameters import count, number, optional
 from hyuav.runs import RunDirectory
+from hyuav.tracking.parameters import identifier
 
 
 @dataclass(frozen=True)
@@ -44,41 +48,67 @@ def _content(training: Training, reported: Reported) -> dict[str, Any]:
     return {"training": training.state_dict(), "reported": dataclasses.asdict(reported)}
 
 
-def restore(run: RunDirectory, training: Training) -> Reported:
+def restore(run: RunDirectory, begin: Callable[[], Training]) -> tuple[Training, Reported]:
     """Put a training where its last checkpoint left it, and say what stands in the way.
 
-    A checkpoint counts if it is whole and the metrics that it knows of are, too. If the last one
-    does not, the one before does; if the metrics of both are damaged, their whole rows are kept.
+    A checkpoint counts if it is whole, the training can go on from it, and the metrics that it
+    knows of are whole, too. If the last one does not, the one before does; if the metrics of both
+    are damaged, their whole rows are kept. The best weights are written anew where their file is
+    not what the checkpoint knows of.
 
     Args:
         run: of the training.
-        training: made with the run's configuration.
+        begin: makes the training with the run's configuration, as often as it is called.
 
     Returns:
-        how much of it has been reported.
+        the training, and how much of it has been reported.
 
     Raises:
-        InputError: there is no whole checkpoint of such a training.
+        InputError: there is no checkpoint from which such a training can go on, or there is
+            something else in the place of a file; then nothing has been written.
         OSError: the run cannot be written to.
     """
+    _require_files(run)
+    training = begin()
     whole: list[_Found] = []
     reasons: list[str] = []
     for file in (run.last_checkpoint, run.previous_checkpoint):
         try:
             found = _read(file)
+            if found.reported.metrics.is_in(run.metrics_file):
+                training.load_state_dict(found.state)
+                _take(found, run, training, reasons)
+                return training, found.reported
         except InputError as error:
             reasons.append(f"{file.name}: {error}")
+            del training  # it may have taken a part
+            training = begin()
             continue
         whole.append(found)
-        if found.reported.metrics.is_in(run.metrics_file):
-            return _take(found, run, training, reasons)
         reasons.append(f"{run.metrics_file}: not what it was at the time of {file.name}")
-    if not whole:
-        raise InputError(reasons[0])
-    reasons.append(f"{run.metrics_file}: its damaged rows are lost")
-    reported = _take(whole[0], run, training, reasons)
-    metrics = undamaged_metrics(run.metrics_file, training.episode)
-    return dataclasses.replace(reported, metrics=metrics)
+    for found in whole:
+        try:
+            training.load_state_dict(found.state)
+        except InputError as error:
+            reasons.append(f"{found.file.name}: {error}")
+            del training
+            training = begin()
+            continue
+        reasons.append(f"{run.metrics_file}: its damaged rows are lost")
+        _take(found, run, training, reasons)
+        metrics = undamaged_metrics(run.metrics_file, training.episode)
+        return training, dataclasses.replace(found.reported, metrics=metrics)
+    raise InputError(reasons[0])
+
+
+def _require_files(run: RunDirectory) -> None:
+    """Accept a run in which nothing else lies where files are replaced or appended to."""
+    checkpoints = run.last_checkpoint, run.previous_checkpoint, run.best_checkpoint
+    in_the_way = [path for path in checkpoints if path.is_dir()]
+    if run.metrics_file.exists() and not run.metrics_file.is_file():
+        in_the_way.append(run.metrics_file)
+    for path in in_the_way:
+        raise InputError(rejection(path.name, str(path), "a file"))
 
 
 class _Found(NamedTuple):
@@ -89,21 +119,41 @@ class _Found(NamedTuple):
 
 def _read(file: Path) -> _Found:
     content = load_checkpoint(file, "training")
-    try:
-        values = content["reported"]
-        metrics = MetricsPosition(**values["metrics"])
-        return _Found(file, content["training"], Reported(**{**values, "metrics": metrics}))
-    except (KeyError, TypeError) as error:
-        raise InputError(f"checkpoint: not of a training like this one ({error})") from None
+    require_entries("checkpoint", content, ("training", "reported"))
+    values = content["reported"]
+    require_entries("reported", values, [field.name for field in dataclasses.fields(Reported)])
+    metrics = values["metrics"]
+    require_entries("reported.metrics", metrics, ("size", "checksum"))
+    reported = Reported(
+        MetricsPosition(
+            count(0)("reported.metrics.size", metrics["size"]),
+            count(0, 2**32 - 1)("reported.metrics.checksum", metrics["checksum"]),
+        ),
+        number(0.0)("reported.seconds", values["seconds"]),
+        optional(identifier)("reported.wandb_id", values["wandb_id"]),
+    )
+    return _Found(file, content["training"], reported)
 
 
-def _take(found: _Found, run: RunDirectory, training: Training, reasons: list[str]) -> Reported:
+def _take(found: _Found, run: RunDirectory, training: Training, reasons: list[str]) -> None:
     """Go on from a checkpoint; what makes it another one than the last is told."""
-    training.load_state_dict(found.state)
     if found.file != run.last_checkpoint:
         found.file.replace(run.last_checkpoint)  # or the next one would replace it, not the bad one
     if reasons:
         reasons.append(f"going on after episode {training.episode}")
+    reasons += _mended_best(run, training)
     for reason in reasons:
         print(harmless(reason), file=sys.stderr)
-    return found.reported
+
+
+def _mended_best(run: RunDirectory, training: Training) -> list[str]:
+    """Write the best weights where their file does not hold such weights, and tell why."""
+    if training.episode == 0:  # they are written with the next checkpoint
+        return []
+    weights = training.best_weights
+    try:
+        require_like("weights", run.best_weights(), weights)
+    except InputError as error:
+        save_checkpoint(run.best_checkpoint, "weights", weights)
+        return [f"{run.best_checkpoint.name}: {error}; written anew from the last checkpoint"]
+    return []
