@@ -138,4 +138,4 @@ def test_this_python_is_one_of_those_stated() -> None:
 
 
 def test_the_extras_are_there() -> None:
-    assert {"bench", "dashboard", "docs", "dev"} <= set(PROJECT["optional-dependencies"])
+    assert {"bench", "cluster", "dashboard", "docs", "dev"} == set(PROJECT["optional-dependencies"])
