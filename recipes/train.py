@@ -23,7 +23,7 @@ from hyuav.configuration import (
     telling_how_to_go_on,
 )
 from hyuav.errors import InputError, rejection
-from hyuav.experiment import resume, saved_weights, train
+from hyuav.experiment import resume, saved_weights, train_or_resume
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import (
@@ -71,7 +71,7 @@ class Train(Parameters):
     "_${hydra.runtime.choices.algorithm}_${seed}",
 )
 def main(config: Config, directory: Path) -> None:
-    """Train, and say where the run is."""
+    """Train, and say where the run is; the same call for the same directory goes on with it."""
     options = section(config, Train)
     if options.resume is not None:
         remove_if_empty(directory)  # which Hydra made for a new training
@@ -86,17 +86,17 @@ def main(config: Config, directory: Path) -> None:
         for index in range(options.learners)
     ]
     configuration = RunConfiguration.from_dict({**config, "learners": learners})
-    weights = None if options.warm_start is None else saved_weights(options.warm_start)
+    start = options.warm_start
     begun = RunDirectory(directory)
     with telling_how_to_go_on(override("resume", directory), possible=lambda: begun.exists):
-        run = train(
+        run = train_or_resume(
             directory,
             configuration,
             logger,
             console,
             device=options.device,
             request=config,
-            initial_weights=weights,
+            initial_weights=lambda: None if start is None else saved_weights(start),
         )
     tell(run, console)
 

@@ -53,3 +53,16 @@ def test_a_signal_that_is_ignored_stays_so(number: signal.Signals) -> None:
         assert not interruption.requested
     finally:
         signal.signal(number, former)
+
+
+def test_a_signal_that_the_program_answers_itself_is_left_to_it() -> None:
+    """As submitit does in a job of SLURM, which is asked twice before it is taken away."""
+    received: list[int] = []
+    former = signal.signal(signal.SIGTERM, lambda number, _: received.append(number))
+    try:
+        with interrupted_by_sigterm(), Interruption() as interruption:
+            signal.raise_signal(signal.SIGTERM)
+        assert received == [signal.SIGTERM]
+        assert not interruption.requested
+    finally:
+        signal.signal(signal.SIGTERM, former)

@@ -106,6 +106,9 @@ def resume(
             training, reported = restore(run, lambda: new_training(configuration, device))
         except OSError as error:
             raise Halted(f"nothing is done: {_cause(error)}") from error
+        rest = f"goes on after episode {training.episode} of {training.parameters.num_episodes}"
+        told = "is finished" if training.is_finished else rest
+        print_line(f"{run.path}: this training {told}", console)
         _train(run, configuration, training, logger, console, logs, reported)
     return run
 
@@ -159,6 +162,8 @@ def train_or_resume(
 ) -> RunDirectory:
     """Train as configured, or go on with that training where it has begun in the directory.
 
+    It is that training if it was configured in the same way and began with the same weights.
+
     Args:
         directory: of the run.
         configuration: of the training.
@@ -166,7 +171,8 @@ def train_or_resume(
         console: to show progress on.
         device: to train on.
         initial_weights: finds what a new training begins with; None for fresh weights.
-        request: all that was asked for, to be kept with a new run.
+        request: all that was asked for, to be kept with a new run. Its ``warm_start`` names what
+            the training begins with.
 
     Raises:
         InputError: another training is there, or as :func:`train` and :func:`resume`.
@@ -174,7 +180,7 @@ def train_or_resume(
         Halted: the training cannot go on.
     """
     run = RunDirectory(directory)
-    if run.exists and run.configuration() == configuration:
+    if run.exists and _is_of(run, configuration, request or {}):
         return resume(directory, logger, console, device=device)
     return train(
         directory,
@@ -185,6 +191,15 @@ def train_or_resume(
         initial_weights=None if run.exists else initial_weights(),
         request=request,
     )
+
+
+def _is_of(run: RunDirectory, configuration: RunConfiguration, request: Mapping[str, Any]) -> bool:
+    """Whether that training was begun in a run's directory."""
+    try:
+        same_start = run.request().get("warm_start") == request.get("warm_start")
+        return same_start and run.configuration() == configuration
+    except InputError:  # of a comparison, perhaps
+        return False
 
 
 def new_training(configuration: RunConfiguration, device: str | None = None) -> Training:

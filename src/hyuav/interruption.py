@@ -12,11 +12,21 @@ from hyuav.errors import Interrupted
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
+def _interrupt(number: int, _: FrameType | None) -> None:
+    raise Interrupted("interrupted", number)
+
+
+USUAL = (signal.SIG_DFL, signal.default_int_handler, _interrupt)
+"""What a signal does that nobody else has a use for: end or interrupt the program."""
+
+
 class Interruption:
     """Remember a request to stop instead of obeying at once; use it as a context manager.
 
     The first SIGINT or SIGTERM is remembered, the second does what it would have done before. A
-    signal that is ignored stays so. Only the main thread can be interrupted.
+    signal that is ignored stays so, and one that the program around answers in a way of its own is
+    left to it: a job of SLURM passes over the SIGTERM before another signal, which puts it back
+    into the queue. Only the main thread can be interrupted.
     """
 
     def __init__(self) -> None:
@@ -26,7 +36,7 @@ class Interruption:
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
             for each in SIGNALS:
-                if signal.getsignal(each) not in (signal.SIG_IGN, None):
+                if signal.getsignal(each) in USUAL:
                     self._former[each] = signal.signal(each, self._remember)
         return self
 
@@ -67,15 +77,11 @@ def interrupted_by_sigterm() -> Iterator[None]:
     Raises:
         Interrupted: in place of the end.
     """
-
-    def interrupt(number: int, _: FrameType | None) -> None:
-        raise Interrupted("interrupted", number)
-
     in_main_thread = threading.current_thread() is threading.main_thread()
     if not in_main_thread or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
         yield
         return
-    signal.signal(signal.SIGTERM, interrupt)
+    signal.signal(signal.SIGTERM, _interrupt)
     try:
         yield
     finally:

@@ -103,6 +103,27 @@ def test_a_training_goes_on_as_it_was_configured(
     assert "not seed" in refusal("train", "resume=begun", "seed=1")
 
 
+def test_the_same_call_goes_on_and_says_so(
+    call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shorter, whole = ("train", "hydra.run.dir=run", *TINY), tmp_path / "whole" / "metrics.csv"
+    longer = (*shorter, "training.num_episodes=6")
+    call(*longer, "hydra.run.dir=whole")
+    call(*shorter)
+    config = tmp_path / "run" / "config.yaml"  # of a training of 6 episodes, of which 4 are flown
+    config.write_text(config.read_text().replace("num_episodes: 4", "num_episodes: 6"))
+    capsys.readouterr()
+    call(*longer, "logger.name=later", "threads=2")
+    assert "run: this training goes on after episode 4 of 6\n" in capsys.readouterr().out
+    own, unbroken = (pd.read_csv(file) for file in (tmp_path / "run" / "metrics.csv", whole))
+    pd.testing.assert_frame_equal(own.drop(columns="seconds"), unbroken.drop(columns="seconds"))
+    call(*longer)
+    assert "run: this training is finished\n" in capsys.readouterr().out
+    for other in ("seed=1", "warm_start=whole"):
+        assert "expected one without a run in it" in refusal(*longer, other)
+    assert pd.read_csv(tmp_path / "run" / "metrics.csv").equals(own)
+
+
 def test_training_starts_from_another_runs_weights(call: Call, tmp_path: Path) -> None:
     call("train", "hydra.run.dir=first", *SHORT)
     call("train", "warm_start=first", "learners=2", "hydra.run.dir=second", *SHORT)
