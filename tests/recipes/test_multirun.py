@@ -1,13 +1,16 @@
 """Multiruns of a recipe: on this machine, by submitit, and on a Ray."""
 
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pandas as pd
+import psutil
 import pytest
 
-from hyuav.runs import RunDirectory
+from hyuav.runs import RunDirectory, readable_metrics
 from recipe_calls import TINY, Call, Refusal
 
 RECIPES = Path(__file__).parents[2] / "recipes"
@@ -82,3 +85,72 @@ def test_a_launcher_trains_the_same(tmp_path: Path, library: str, launcher: str)
         pd.testing.assert_frame_equal(
             found.drop(columns="seconds"), expected.drop(columns="seconds"), check_exact=True
         )
+
+
+EPISODES = 400
+LONG = ("seed=0,1", f"training.num_episodes={EPISODES}", "training.checkpoint_every=0")
+
+
+def begin(directory: Path, *launcher: str) -> psutil.Popen:
+    """A sweep of two jobs in ``sweep/``, long enough to be disturbed."""
+    command = [sys.executable, str(RECIPES / "train.py"), "-m", *SHORT, *LONG, *launcher]
+    return psutil.Popen(
+        [*command, "hydra.sweep.dir=sweep"], cwd=directory, stderr=subprocess.PIPE, text=True
+    )
+
+
+def episodes(run: Path) -> list[int]:
+    return [int(number) for number in readable_metrics(run / "metrics.csv")["episode"]]
+
+
+def wait_for_episode(number: int, run: Path, sweep: psutil.Popen) -> None:
+    while len(episodes(run)) < number:
+        assert sweep.poll() is None
+        time.sleep(0.05)
+
+
+def worker(run: Path, sweep: psutil.Popen) -> psutil.Process:
+    """The process that trains a job of a sweep."""
+    metrics = str(run / "metrics.csv")
+    (found,) = (
+        process
+        for process in sweep.children(recursive=True)
+        if metrics in {file.path for file in process.open_files()}
+    )
+    return found
+
+
+@pytest.mark.slow
+def test_a_job_that_is_taken_away_and_put_back_into_the_queue_goes_on(tmp_path: Path) -> None:
+    """By the signals that SLURM sends: SIGTERM, and then the one at which submitit puts it back."""
+    pytest.importorskip("hydra_plugins.hydra_submitit_launcher")
+    run = tmp_path / "sweep" / NAMES[0]
+    sweep = begin(tmp_path, "hydra/launcher=submitit_local")
+    wait_for_episode(20, run, sweep)
+    trains = worker(run, sweep)
+    trains.send_signal(signal.SIGTERM)
+    wait_for_episode(len(episodes(run)) + 20, run, sweep)
+    trains.send_signal(signal.SIGUSR2)
+    _, said = sweep.communicate(timeout=600)
+    assert sweep.returncode == 0, said
+    for run in (tmp_path / "sweep").glob("*_*"):
+        assert episodes(run) == list(range(1, EPISODES + 1))
+    logs = [file.read_text() for file in (tmp_path / "sweep" / ".submitit").rglob("*.out")]
+    assert sum("this training goes on after episode " in log for log in logs) == 1
+
+
+@pytest.mark.slow
+def test_a_lost_worker_of_ray_is_named_and_stops_no_other_job(tmp_path: Path) -> None:
+    pytest.importorskip("ray")
+    lost, other = (tmp_path / "sweep" / f"{seed}_two_clusters_ddpg_{seed}" for seed in (0, 1))
+    sweep = begin(tmp_path, "hydra/launcher=ray", "hydra.launcher.workers=2")
+    for run in (lost, other):
+        wait_for_episode(5, run, sweep)
+    worker(lost, sweep).kill()
+    _, said = sweep.communicate(timeout=600)
+    assert sweep.returncode == 2
+    (job,) = (line for line in said.splitlines() if line.startswith("Error executing job"))
+    assert "'seed=0'" in job
+    assert said.splitlines()[-1] == "error: its worker was lost"
+    assert len(episodes(lost)) < EPISODES
+    assert episodes(other) == list(range(1, EPISODES + 1))
