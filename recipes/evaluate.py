@@ -17,7 +17,8 @@ from rich.console import Console
 from hyuav.configuration import Config, recipe, section
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE, EvaluationParameters, evaluate
-from hyuav.experiment import learned_policies, print_results, reference_policies
+from hyuav.evaluation_table import print_results
+from hyuav.experiment import learned_policies, reference_policies
 from hyuav.figures import save_flight_map
 from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text, thread_count
 from hyuav.report.page import write_run_report

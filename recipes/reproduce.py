@@ -24,10 +24,10 @@ from torch import Tensor
 from hyuav.configuration import Config, recipe, same_call, section, telling_how_to_go_on
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.evaluation_table import print_results
 from hyuav.experiment import (
     LEARNED_AS_IN_PAPER,
     learned_policies,
-    print_results,
     reference_policies,
     select_initial_weights,
     train_or_resume,

@@ -9,8 +9,8 @@ import torch
 from rich.console import Console
 from torch import Tensor
 
-from hyuav.errors import Halted, InputError, harmless, rejection
-from hyuav.evaluation import LABELS, OPTIMA, Evaluation, Policy
+from hyuav.errors import Halted, InputError, rejection
+from hyuav.evaluation import LABELS, OPTIMA, Policy
 from hyuav.interruption import Interruption
 from hyuav.learning.algorithms import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file
@@ -22,7 +22,7 @@ from hyuav.scenario import Scenario
 from hyuav.schemes.learned import LearnedPolicy
 from hyuav.schemes.linear import ConstantVelocity, ja_lt, re_lt
 from hyuav.schemes.optimum import FlightPolicy, solve
-from hyuav.terminal import make_progress, print_line, print_table, results_table
+from hyuav.terminal import make_progress, print_line
 from hyuav.tracking import LoggerParameters, Tracker
 from hyuav.tracking.checkpoints import Reported, first_checkpoint, restore
 
@@ -368,42 +368,3 @@ def reference_policies(
     for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [Policy(FlightPolicy(optimum.path, scenario))]
     return policies
-
-
-def print_results(evaluation: Evaluation, console: Console) -> None:
-    """Print the evaluation as a table that fits 80 columns."""
-    summary = evaluation.summary
-    title = (
-        f"{harmless(summary['scenario'])}, T = {summary['num_slots']}: mean of "
-        f"{summary['episodes']} episodes on the same fading, 95 % interval"
-    )
-    table = results_table(
-        title,
-        "Scheme",
-        "Secrecy sum-rate\n(bps/Hz)",
-        "own\noptimum",
-        "hybrid\noptimum",
-        "relay\nslots",
-        "UEs off-\nloading",
-        "off\nmap",
-    )
-    for scheme, result in summary["schemes"].items():
-        rate = result["secrecy_sum_rate"]
-        table.add_row(
-            LABELS[scheme],
-            "{:.2f} [{:.2f}, {:.2f}]".format(rate["mean"], *rate["ci95"]),
-            _percent(result.get("fraction_of_optimum")),
-            _percent(result.get("fraction_of_hybrid_optimum")),
-            _percent(result["relay_share"]),
-            _percent(result["offloading_share"]),
-            f"{result['off_map']:.1f}",
-        )
-    print_table(table, console)
-    for scheme, result in summary["schemes"].items():
-        if result["budget_violations"] > 0:
-            count = f"{result['budget_violations']:.2f}"
-            console.print(f"{LABELS[scheme]}: {count} energy budgets exceeded per episode")
-
-
-def _percent(fraction: float | None) -> str:
-    return "-" if fraction is None else f"{100 * fraction:.1f} %"
