@@ -24,6 +24,7 @@ CASES = {
     "command line": 60,
     "checkpoint, bytes": 600,
     "checkpoint, content": 200,
+    "checkpoint, resumed": 300,
     "metrics": 300,
     "evaluation": 500,
     "flights": 100,

@@ -1,10 +1,15 @@
 """Hostile checkpoints: loaded as finite numbers or refused in one line, and never run."""
 
+import copy
+import dataclasses
 import io
+import math
 import os
 import pickle
+import shutil
 import warnings
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +17,19 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.console import Console
+from torch import Tensor
 
 from hostile import CASES, TRIED, anything, attempt, fuzz, mutated, texts
 from hyuav import InputError, Scenario
-from hyuav.experiment import learned_policy, saved_weights
-from hyuav.learning.algorithms import DDPG
+from hyuav.errors import Halted
+from hyuav.experiment import learned_policy, resume, saved_weights, train
+from hyuav.learning.algorithms import DDPG, RobustSAC
 from hyuav.learning.checkpoint import FORMAT, load_checkpoint, save_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
+from hyuav.runs import RunConfiguration, RunDirectory
+from hyuav.tracking import LoggerParameters
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0), (-3.0, 4.0)), num_slots=2)
 ALGORITHM = DDPG(hidden_sizes=(2,))
@@ -133,7 +143,12 @@ weights = st.dictionaries(
 ).map(lambda changed: {**WEIGHTS, **changed})
 states = st.dictionaries(
     st.sampled_from(sorted(STATE["cohorts"][0])) | texts, tensors | anything, max_size=2
-).map(lambda changed: {"cohorts": [{**STATE["cohorts"][0], **changed}, *STATE["cohorts"][1:]]})
+).map(
+    lambda changed: {
+        **STATE,
+        "cohorts": [{**STATE["cohorts"][0], **changed}, *STATE["cohorts"][1:]],
+    }
+)
 
 
 @pytest.mark.slow
@@ -151,6 +166,105 @@ def test_the_content_of_a_checkpoint_is_used_or_refused(tmp_path: Path) -> None:
             else:
                 path.write_bytes(saved(state, "training"))
                 attempt(kind, lambda: training().load_state_dict(load_checkpoint(path, "training")))
+
+    try_one()
+    assert sum(TRIED[kind, outcome] for outcome in ("worked", "refused")) >= CASES[kind]
+
+
+RESUMED = RunConfiguration(
+    "custom",
+    SCENARIO,
+    (Learner("hybrid"), Learner("relay")),
+    "sac_robust",
+    RobustSAC(hidden_sizes=(2,), warm_up_episodes=1, repeat_every=2, imagined_flights=2),
+    dataclasses.replace(
+        PARAMETERS, num_episodes=2, evaluation_every=1, evaluation_episodes=1, cohorts=1
+    ),
+)
+OFF, SILENT = LoggerParameters(mode="disabled"), Console(file=io.StringIO())
+
+
+@pytest.fixture(scope="module")
+def two_of_three(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    """A run that has an episode left to fly."""
+    run = train(tmp_path_factory.mktemp("fuzzed") / "run", RESUMED, OFF, SILENT)
+    config = run.config_file.read_text()
+    run.config_file.write_text(config.replace("num_episodes: 2", "num_episodes: 3"))
+    return run
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """The paths to everything within nested values, but to the whole."""
+    entries = value.items() if isinstance(value, dict) else enumerate(value)
+    found = []
+    for key, own in entries:
+        found.append((*path, key))
+        if isinstance(own, dict | list | tuple):
+            found += places(own, (*path, key))
+    return found
+
+
+def changed(value: Any, path: tuple[Any, ...], change: Callable[[Any], Any]) -> Any:
+    """Nested values of which one is another, or is left out."""
+    if not path:
+        return change(value)
+    kept = list(value) if isinstance(value, tuple) else copy.copy(value)  # and what it is marked by
+    kept[path[0]] = changed(value[path[0]], path[1:], change)
+    if kept[path[0]] is LEFT_OUT:
+        del kept[path[0]]
+    return tuple(kept) if isinstance(value, tuple) else kept
+
+
+def near(value: Any, how: int) -> Any:
+    """A value of the same kind that may be out of range, or of a shape that may not fit."""
+    if isinstance(value, Tensor):
+        ways = (
+            *(lambda: torch.full_like(value, 3), lambda: torch.zeros_like(value)),
+            *(lambda: -value.float() - 1, lambda: value.float() * torch.nan),
+            *(lambda: value.float() * 1e38, lambda: value[..., :1], lambda: value.double()),
+            *(lambda: value.flatten(), lambda: value.unsqueeze(0), lambda: value.to_sparse()),
+            *(lambda: torch.zeros(1, dtype=value.dtype).expand(value.shape), lambda: 1.0),
+            lambda: (value + 2**62) if value.dtype == torch.int64 else value.float() / 0.0,
+        )
+        return ways[how % len(ways)]()
+    if isinstance(value, int | float):
+        return (value + 1, value - 1, -value, value + 2**40, value + 0.5, 2**62)[how % 6]
+    return [value] if how % 2 else LEFT_OUT
+
+
+LEFT_OUT = object()
+
+
+@pytest.mark.slow
+def test_a_training_goes_on_from_a_changed_checkpoint_or_refuses_it(
+    two_of_three: RunDirectory, tmp_path: Path
+) -> None:
+    kind, path = "checkpoint, resumed", tmp_path / "run"
+    content = load_checkpoint(two_of_three.last_checkpoint, "training")
+    others = (tensors | anything).map(lambda new: lambda _: new)
+    changes = st.integers(0, 100).map(lambda how: lambda value: near(value, how)) | others
+
+    def go_on(run: RunDirectory) -> None:
+        try:
+            resume(run.path, OFF, SILENT)
+        except Halted as error:  # its weights are no longer finite
+            raise InputError(str(error)) from None
+        cells = [line.split(",") for line in run.metrics_file.read_text().splitlines()]
+        numbers = [cell for row in cells[1:] for cell in (*row[:3], *row[4:]) if cell]
+        assert all(math.isfinite(float(cell)) for cell in numbers)
+        assert run.best_weights()
+        assert load_checkpoint(run.last_checkpoint, "training")
+
+    @fuzz(kind)
+    @given(st.sampled_from(places(content)), changes)
+    def try_one(place: tuple[Any, ...], change: Callable[[Any], Any]) -> None:
+        shutil.rmtree(path, ignore_errors=True)
+        run = RunDirectory(shutil.copytree(two_of_three.path, path))
+        run.previous_checkpoint.unlink()
+        run.last_checkpoint.write_bytes(saved(changed(content, place, change), "training"))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            attempt(kind, lambda: go_on(run))
 
     try_one()
     assert sum(TRIED[kind, outcome] for outcome in ("worked", "refused")) >= CASES[kind]

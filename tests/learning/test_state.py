@@ -99,6 +99,20 @@ def test_what_is_no_state_is_refused(odd: Any) -> None:
         training().load_state_dict(odd)
 
 
+@pytest.mark.parametrize("size", [(), (2, 6), (6, 2, 1)])
+def test_a_replay_that_is_marked_as_of_another_size_is_refused(
+    flown: dict[str, Any], size: tuple[int, ...]
+) -> None:
+    state = copy.deepcopy(flown)
+    stored = state["cohorts"][0]["replay"]["_storage"]["_storage"]
+    stored._metadata["next"]["batch_size"] = torch.Size(size)
+    with pytest.raises(InputError, match=r"^checkpoint: [^\n]*_storage metadata[^\n]*$"):
+        training().load_state_dict(state)
+    state["cohorts"][0]["replay"]["_storage"]["_storage"] = dict(stored)
+    with pytest.raises(InputError, match=r"^checkpoint: [^\n]*_storage metadata[^\n]*$"):
+        training().load_state_dict(state)
+
+
 def test_weights_that_share_their_memory_are_given_memory_of_their_own(
     flown: dict[str, Any],
 ) -> None:

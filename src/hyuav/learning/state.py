@@ -177,8 +177,13 @@ def _require_replay(name: str, value: Any, example: dict[str, Any], cohort: "Coh
     if length:
         memory = cohort.algorithm.parameters.memory
         slot = cohort.env.fake_tensordict().select(*memory.names)
-        like = slot.expand(capacity, *slot.batch_size).flatten_keys(".").to_dict()
-        require_like(f"{name}._storage._storage", stored, like)
+        like = slot.expand(capacity, *slot.batch_size)
+        require_like(f"{name}._storage._storage", stored, like.flatten_keys(".").to_dict())
+        parts: Any = getattr(stored, "_metadata", None)  # by which TensorDict puts them together
+        require_entries(f"{name}._storage._storage metadata", parts, ("", "next"))
+        for part in parts.values():
+            sizes = {"batch_size": like.batch_size, "device": part["device"]}
+            require_like(f"{name}._storage._storage metadata", part, sizes)
     else:
         require_entries(f"{name}._storage._storage", stored, ())
 
