@@ -41,7 +41,7 @@ def test_a_comparison_trains_prints_keeps_and_draws(
     assert {path.name for path in (here / "figures").iterdir()} == {
         f"{name}.{kind}"
         for name in ("cells", "learning_curves", "performance_profiles", "improvement")
-        for kind in ("png", "pdf")
+        for kind in ("png", "pdf", "csv")
     }
     assert {path.name for path in (here / "shards").iterdir()} == SHARDS
     assert not list(here.rglob("wandb"))

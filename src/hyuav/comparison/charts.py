@@ -51,7 +51,7 @@ def dash(entry: str) -> int:
 
 
 def draw(summary: Summary, options: Compare, directory: Path) -> None:
-    """Write the figures as PNG and PDF.
+    """Write the figures as PNG and PDF, and as CSV what they show.
 
     Args:
         summary: of the comparison.
@@ -59,15 +59,18 @@ def draw(summary: Summary, options: Compare, directory: Path) -> None:
         directory: for the files.
     """
     results, threshold = summary.results, options.threshold
-    save_figure(cell_means(summary.cells), directory, "cells")
+    save_figure(cell_means(summary.cells), directory, "cells", {"": summary.cells})
     curves = learning_curves(summary.curves)
     if len(curves):
-        save_figure(curves_figure(curves, threshold), directory, "learning_curves")
+        figure = curves_figure(curves, threshold)
+        save_figure(figure, directory, "learning_curves", {"": curves})
     lowest = max(math.floor(20 * results["fraction"].min()) / 20, 0.0)
     profiles = performance_profiles(results, np.linspace(min(lowest, 0.95), 1.0, 101))
-    save_figure(profiles_figure(profiles, threshold), directory, "performance_profiles")
+    figure = profiles_figure(profiles, threshold)
+    save_figure(figure, directory, "performance_profiles", {"": profiles})
     if len(summary.improvements):
-        save_figure(improvement_bars(summary.improvements), directory, "improvement")
+        figure, table = improvement_bars(summary.improvements), summary.improvements
+        save_figure(figure, directory, "improvement", {"": table})
 
 
 def cell_means(cells: pd.DataFrame) -> Figure:
