@@ -26,12 +26,18 @@ ROOMS = {
 SHARED = {
     "scenario": ("hyuav.scenario", "hyuav.layouts", "hyuav.parameters", "hyuav.errors"),
     "envs": ("hyuav.system", "hyuav.randomness", "hyuav.recording"),
-    "evaluation": ("hyuav.evaluation", "hyuav.intervals", "hyuav.maps"),
+    "evaluation": (
+        "hyuav.evaluation",
+        "hyuav.evaluation_table",
+        "hyuav.intervals",
+        "hyuav.maps",
+    ),
     "recipes": (
         "hyuav.experiment",
         "hyuav.runs",
         "hyuav.metrics",
         "hyuav.metrics_file",
+        "hyuav.files",
         "hyuav.durable",
         "hyuav.interruption",
         "hyuav.cluster",

@@ -124,7 +124,7 @@ class Finished:
 
     def _existing(self, name: str) -> Path:
         file = self.run.path / name
-        if not file.is_file():  # a pipe would be waited for
+        if not file.exists():
             raise InputError(
                 f"there is no {name} in {self.run.path} (recipes/evaluate.py makes it)"
             )
