@@ -79,5 +79,5 @@ def test_damaged_metrics_leave_a_figure_out_and_refuse_it_where_it_is_asked_for(
 def test_a_pipe_is_not_waited_for(call: Call, refusal: Refusal, tmp_path: Path) -> None:
     call("train", "hydra.run.dir=run", *TINY)
     os.mkfifo(tmp_path / "run" / "evaluation.json")
-    line = "figure energy: there is no evaluation.json in run"
+    line = "figure energy: run/evaluation.json: expected an evaluation in JSON"
     assert line in refusal("draw", "run=run", "figures=energy")

@@ -144,6 +144,8 @@ def _learning_curves(finished: Finished, directory: Path, name: str) -> None:
         if not run.metrics_file.exists():
             raise InputError(f"there is no {run.metrics_file.name} in {run.path}")
         metrics = readable_metrics(run.metrics_file)
+        if metrics.empty:
+            metrics = run.metrics()  # which refuses what is no table
         own = metrics[metrics["num_slots"] == finished.scenario.num_slots]
         rewards = {
             LEARNED[str(rule)]: rows.pivot_table("accumulated_reward", "episode", "learner")
