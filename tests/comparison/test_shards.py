@@ -296,7 +296,7 @@ def test_a_damaged_optimum_is_none(optima: Optima, tmp_path: Path, share: float)
     assert not dataclasses.replace(damaged, horizons=(6, 9)).is_solved
     cut(damaged.file, share)
     assert not damaged.is_solved
-    with pytest.raises(InputError, match=r"campus\.parquet': expected best flights in Parquet \("):
+    with pytest.raises(InputError, match=r"campus\.parquet: expected best flights in Parquet \("):
         damaged.policy("relay", 6)
 
 

@@ -9,7 +9,7 @@ import torch
 from pyarrow.lib import ArrowException
 
 from hyuav.durable import write_durably
-from hyuav.errors import InputError, one_line, rejection
+from hyuav.errors import InputError, one_line
 from hyuav.evaluation import OPTIMA, Policy
 from hyuav.scenario import Scenario
 from hyuav.schemes.optimum import FlightPolicy, solve_horizons
@@ -77,5 +77,5 @@ class Optima:
         try:
             return pd.read_parquet(self.file)[columns]
         except (OSError, LookupError, ValueError, ArrowException) as error:
-            accepted = f"best flights in Parquet ({one_line(str(error))})"
-            raise InputError(rejection("optima", str(self.file), accepted)) from None
+            reason = one_line(str(error))
+            raise InputError(f"{self.file}: expected best flights in Parquet ({reason})") from None
