@@ -25,7 +25,7 @@ reproduce: setup ## train Proposed, Re-OT and Ja-OT, evaluate them, draw the fig
 
 figures: setup ## draw all figures of the paper: N = 10 to 20, both layouts, 10 and 5 seeds
 	$(BIN)/python recipes/reproduce.py $(FIGURES) seeds=10 further_seeds=5 \
-		num_slots=[10,12,14,16,18,20] $(ARGS)
+		num_slots=[10,12,14,16,18,20] training.num_episodes=650 $(ARGS)
 
 figures-quick: setup ## the same, quick and rough: 2 seeds, N = 10, 15, 20, short trainings
 	$(BIN)/python recipes/reproduce.py $(FIGURES) $(QUICK) $(ARGS)
