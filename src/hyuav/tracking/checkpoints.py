@@ -69,35 +69,29 @@ def restore(run: RunDirectory, begin: Callable[[], Training]) -> tuple[Training,
         OSError: the run cannot be written to.
     """
     _require_files(run)
-    training = begin()
     whole: list[_Found] = []
     reasons: list[str] = []
     for file in (run.last_checkpoint, run.previous_checkpoint):
         try:
             found = _read(file)
-            if found.reported.metrics.is_in(run.metrics_file):
-                training.load_state_dict(found.state)
-                _take(found, run, training, reasons)
-                return training, found.reported
         except InputError as error:
             reasons.append(f"{file.name}: {error}")
-            del training  # it may have taken a part
-            training = begin()
             continue
-        whole.append(found)
-        reasons.append(f"{run.metrics_file}: not what it was at the time of {file.name}")
+        if not found.reported.metrics.is_in(run.metrics_file):
+            whole.append(found)
+            reasons.append(f"{run.metrics_file}: not what it was at the time of {file.name}")
+            continue
+        training = _gone_on(found, begin, reasons)
+        if training is not None:
+            _take(found, run, training, reasons)
+            return training, found.reported
     for found in whole:
-        try:
-            training.load_state_dict(found.state)
-        except InputError as error:
-            reasons.append(f"{found.file.name}: {error}")
-            del training
-            training = begin()
-            continue
-        reasons.append(f"{run.metrics_file}: its damaged rows are lost")
-        _take(found, run, training, reasons)
-        metrics = undamaged_metrics(run.metrics_file, training.episode)
-        return training, dataclasses.replace(found.reported, metrics=metrics)
+        training = _gone_on(found, begin, reasons)
+        if training is not None:
+            reasons.append(f"{run.metrics_file}: its damaged rows are lost")
+            _take(found, run, training, reasons)
+            metrics = undamaged_metrics(run.metrics_file, training.episode)
+            return training, dataclasses.replace(found.reported, metrics=metrics)
     raise InputError(reasons[0])
 
 
@@ -133,6 +127,17 @@ def _read(file: Path) -> _Found:
         optional(identifier)("reported.wandb_id", values["wandb_id"]),
     )
     return _Found(file, content["training"], reported)
+
+
+def _gone_on(found: _Found, begin: Callable[[], Training], reasons: list[str]) -> Training | None:
+    """A training of its own where the checkpoint left it; None where it does not fit, and why."""
+    training = begin()
+    try:
+        training.load_state_dict(found.state)
+    except InputError as error:
+        reasons.append(f"{found.file.name}: {error}")
+        return None
+    return training
 
 
 def _take(found: _Found, run: RunDirectory, training: Training, reasons: list[str]) -> None:
