@@ -270,8 +270,7 @@ class Parameters:
             InputError: no names with values, or an unknown, missing or unacceptable field.
         """
         owner = cls.__name__.lower()
-        if not isinstance(values, Mapping):
-            raise InputTypeError(rejection(owner, values, "names with values"))
+        mapping(owner, values)
         fields = dataclasses.fields(cls)
         refuse_unknown(owner, values, [field.name for field in fields])
         for field in fields:
