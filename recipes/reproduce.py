@@ -123,25 +123,24 @@ def reproduce(config: Config, directory: Path) -> None:
     weights = partial(_candidates, as_in_paper, options, console)
     paper_run = work.train(directory / AS_IN_PAPER, as_in_paper, weights)
     paper = learned_policies([paper_run], scenario, LEARNED_AS_IN_PAPER)
-    own_evaluation = work.evaluate(run, scenario, run.path, paper)
-    logged = [(run.path, own_evaluation, [run, paper_run])]
+    evaluated = [(run.path, work.evaluate(run, scenario, run.path, paper), [run, paper_run])]
     for num_slots in others:
         over = dataclasses.replace(scenario, num_slots=num_slots)
         path = horizon_directory(run, num_slots)
-        logged.append((path, work.evaluate(run, over, path), [run]))
-    evaluations = [own_evaluation]
+        evaluated.append((path, work.evaluate(run, over, path), [run]))
     for configuration in further:
         beside = work.train(directory / configuration.scenario_name, configuration)
-        evaluations.append(work.evaluate(beside, configuration.scenario, beside.path))
-        logged.append((beside.path, evaluations[-1], [beside]))
+        evaluation = work.evaluate(beside, configuration.scenario, beside.path)
+        evaluated.append((beside.path, evaluation, [beside]))
     draw(run, options.figures, console)
     paths = [run.path, *(run.path / own.scenario_name for own in further)]
     with make_progress(console, "reports") as progress:
         reports = [write_run_report(path) for path in progress.track(paths)]
-    for path, evaluation, trained in logged:
+    for path, evaluation, trained in evaluated:
         work.log(path, evaluation, trained)
-    for evaluation in evaluations:
-        print_results(evaluation, console)
+    for path, evaluation, _ in evaluated:
+        if path in paths:
+            print_results(evaluation, console)
     print_line(f"figures: {run.figures}", console)
     for report in reports:
         print_line(f"report: {report}", console)
