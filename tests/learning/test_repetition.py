@@ -42,7 +42,7 @@ def test_every_nth_episode_takes_the_actions_of_each_learners_best(compiled: boo
     for episode in range(1, 17):
         if compiled and episode == 4:
             trained.compile()
-        reward, _ = trained.fly()
+        reward, *_ = trained.fly()
         if trained.algorithm.repeats(episode):
             first = torch.stack(rewards).argmax(dim=0)
             expected = torch.stack([flights[index][:, n] for n, index in enumerate(first)], dim=1)

@@ -89,8 +89,8 @@ def test_compiled_slots_are_the_eager_ones_up_to_rounding(name: str, scenario: S
     after = tensors(other)
     assert all(torch.equal(before[key], after[key]) for key in before)  # recording does nothing
     for _ in range(9):  # beyond the end of the replay
-        reward, losses = eager.fly()
-        other_reward, other_losses = other.fly()
+        reward, losses, _ = eager.fly()
+        other_reward, other_losses, _ = other.fly()
         torch.testing.assert_close(other_reward, reward, rtol=1e-3, atol=1e-4)
         torch.testing.assert_close(other_losses, losses, rtol=1e-2, atol=1e-4)
         assert_agree(tensors(eager), tensors(other))
@@ -99,6 +99,21 @@ def test_compiled_slots_are_the_eager_ones_up_to_rounding(name: str, scenario: S
     eager.fly()
     other.fly()
     assert_agree(tensors(eager), tensors(other))
+
+
+def test_the_slot_is_known_in_which_numbers_were_no_longer_finite() -> None:
+    """One transition of a learner earned too much; it is not among the first that are sampled."""
+    eager, compiled = cohort("ddpg"), cohort("ddpg")
+    for trained in (eager, compiled):
+        for _ in range(2):
+            trained.fly()
+        trained.replay.storage._storage["next", "reward"][1, 1] = torch.inf
+    compiled.compile()
+    finite = [trained.fly().finite.tolist() for trained in (eager, compiled)]
+    assert finite[0] == finite[1]
+    assert 0 < finite[0][1] < finite[0][0] == finite[0][2] == SCENARIO.num_slots
+    for trained in (eager, compiled):
+        assert trained.stopped.tolist() == [0, 2 * SCENARIO.num_slots + finite[0][1] + 1, 0]
 
 
 def test_nothing_is_compiled_before_every_slot_is_followed_by_an_update() -> None:

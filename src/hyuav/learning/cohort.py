@@ -16,7 +16,7 @@ from hyuav.learning.imagination import Imagination
 from hyuav.learning.repetition import as_planned
 from hyuav.learning.replay import clear_unused, forget, latest, make_replay
 from hyuav.learning.search import FlightSearch
-from hyuav.learning.slots import CompiledSlots
+from hyuav.learning.slots import CompiledSlots, Flown, all_finite
 from hyuav.learning.state import with_own_memory
 from hyuav.learning.weights import (
     copy_weights,
@@ -184,20 +184,18 @@ class Cohort:
         """Whether the next episode is flown by compiled programs."""
         return self._compiled is not None
 
-    def fly(self) -> tuple[Tensor, dict[str, Tensor]]:
+    def fly(self) -> Flown:
         """Fly and learn for one episode.
 
         A learner whose losses, reward or weights are no longer finite stops: ``stopped`` (N,) is
-        the episode, 0 for those that go on. Its numbers do not count any more.
-
-        Returns:
-            the accumulated reward (N,) in bps/Hz, and each gradient step's mean loss (N,).
+        the slot, counted from the first of training, 0 for those that go on. Its numbers do not
+        count any more.
         """
         self.episode += 1
         self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
         self._keep_flight()
-        self._stop_where_not_finite(*flown)
+        self._stop_where_not_finite(flown)
         return flown
 
     def _keep_flight(self) -> None:
@@ -218,11 +216,11 @@ class Cohort:
         flights.keep(flown["action"], way, flown["next", "reward"].sum(dim=(0, 2)))
         flights.try_best()
 
-    def _stop_where_not_finite(self, reward: Tensor, losses: dict[str, Tensor]) -> None:
-        finite = finite_learners(self.algorithm.loss) & reward.isfinite()
-        for loss in losses.values():
-            finite &= loss.isfinite()
-        self.stopped = torch.where((self.stopped == 0) & ~finite, self.episode, self.stopped)
+    def _stop_where_not_finite(self, flown: Flown) -> None:
+        slots = self.scenario.num_slots
+        finite = finite_learners(self.algorithm.loss) & (flown.finite == slots)
+        slot = (self.episode - 1) * slots + (flown.finite + 1).clamp(max=slots)
+        self.stopped = torch.where((self.stopped == 0) & ~finite, slot, self.stopped)
         where = self.stopped > 0
         if where.any():  # they take part in every product, so they are kept finite
             own = copy_weights(self.algorithm.loss)
@@ -232,7 +230,7 @@ class Cohort:
                 forget_moments(step.optimizer, where)
             forget(self.replay, where)
 
-    def _fly_compiled(self, compiled: CompiledSlots) -> tuple[Tensor, dict[str, Tensor]]:
+    def _fly_compiled(self, compiled: CompiledSlots) -> Flown:
         slots, draws = self.scenario.num_slots, self.env.base_env.draws
         blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
         if self.algorithm.parameters.repeat_every:
@@ -242,13 +240,14 @@ class Cohort:
         if self.env.base_env.system.edge_can_saturate:
             blocks["tasks"] = draws.take_tasks(slots).contiguous()
         carrier = self.collector._carrier
-        reward, losses = compiled.fly(carrier, blocks, self.updates, self.episode)
+        flown = compiled.fly(carrier, blocks, self.updates, self.episode)
         self.updates += slots
         carrier.update(self.env.reset())
-        return reward, losses
+        return flown
 
-    def _fly_slots(self) -> tuple[Tensor, dict[str, Tensor]]:
+    def _fly_slots(self) -> Flown:
         reward = torch.zeros(len(self.learners), device=self.env.device)
+        unbroken, finite = reward == 0.0, reward.long()
         losses: list[dict[str, Tensor]] = []
         for _ in range(self.scenario.num_slots):
             transition = next(self._transitions)[:, 0]
@@ -256,7 +255,10 @@ class Cohort:
             self.replay.extend(self.algorithm.parameters.memory.transition(transition).unsqueeze(0))
             if len(self.replay) >= self.batch_size:
                 losses.append(self._learn())
-        return reward, _mean(losses)
+                unbroken = unbroken & all_finite(losses[-1].values())
+            unbroken = unbroken & reward.isfinite()
+            finite += unbroken
+        return Flown(reward, _mean(losses), finite)
 
     def _learn(self) -> dict[str, Tensor]:
         """Lines 13 to 15 of Algorithm 1; the collector has gone through lines 3 to 11."""

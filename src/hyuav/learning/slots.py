@@ -8,7 +8,8 @@ training may change over between any two episodes and a checkpoint serves both.
 """
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -23,6 +24,22 @@ from hyuav.learning.replay import sampled_slots
 from hyuav.randomness import given_normals
 from hyuav.recording import compile_function
 from hyuav.system import Tasks
+
+
+class Flown(NamedTuple):
+    """What an episode brought to each of N learners."""
+
+    reward: Tensor
+    """(N,) bps/Hz, accumulated."""
+    losses: dict[str, Tensor]
+    """(N,), each gradient step's mean."""
+    finite: Tensor
+    """(N,), in how many slots, from the first, rewards and losses were finite numbers."""
+
+
+def all_finite(values: Iterable[Tensor]) -> Tensor:
+    """Of which learners all these (N,) are finite numbers: (N,) bool."""
+    return torch.stack([each.isfinite() for each in values]).all(dim=0)
 
 
 class CompiledSlots:
@@ -65,6 +82,7 @@ class CompiledSlots:
         self._totals = {
             name: torch.zeros(learners, device=device) for name in ("reward", *self._adam)
         }
+        self._finite = torch.zeros(learners, dtype=torch.int64, device=device)
         examples = self._examples(batch_size)
         self._names = tuple(examples)
         self._programs = {
@@ -74,7 +92,7 @@ class CompiledSlots:
 
     def fly(
         self, carrier: TensorDictBase, draws: Mapping[str, Tensor], updates: int, episode: int
-    ) -> tuple[Tensor, dict[str, Tensor]]:
+    ) -> Flown:
         """Fly and learn for as many slots as there are draws.
 
         Args:
@@ -87,9 +105,6 @@ class CompiledSlots:
                 (slots, N, 2, U) where the environment needs them.
             updates: taken before.
             episode: which one it is, from 1.
-
-        Returns:
-            the accumulated reward (N,) in bps/Hz, and each gradient step's mean loss (N,).
         """
         slots = len(draws["exploration"])
         self._begin(carrier)
@@ -104,13 +119,13 @@ class CompiledSlots:
                     counts[name] += due
         self._end(updates + slots, slots)
         losses = {name: self._totals[name] / count for name, count in counts.items() if count}
-        return self._totals["reward"].clone(), losses
+        return Flown(self._totals["reward"].clone(), losses, self._finite.clone())
 
     def _begin(self, carrier: TensorDictBase) -> None:
         self._carrier.update_(carrier.select(*self._carrier.keys()))
         self._cursor.fill_(self._replay.writer._cursor)
         self._length.fill_(len(self._replay))
-        for total in self._totals.values():
+        for total in (*self._totals.values(), self._finite):
             total.zero_()
 
     def _end(self, updates: int, slots: int) -> None:
@@ -168,6 +183,7 @@ class CompiledSlots:
             batch = self._algorithm.fair(self._sample(given["sampling"]))
             self._update(batch, taken, given["corrections"])
         self._totals["reward"].add_(flown["next", "reward"].squeeze(-1))
+        self._finite.add_(all_finite(self._totals.values()))
 
     def _fly_slot(self, given: Mapping[str, Tensor]) -> TensorDictBase:
         env, draws = self._env, self._env.base_env.draws

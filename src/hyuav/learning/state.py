@@ -91,8 +91,9 @@ def require_state(name: str, state: Any, cohort: "Cohort") -> None:
     episode = counted(f"{name}.episode", state["episode"])
     counted(f"{name}.updates", state["updates"])
     stopped, best = state["stopped"], state["best_evaluation"]
-    if not ((stopped >= 0) & (stopped <= episode)).all():
-        raise InputError(f"{name}.stopped: expected episodes up to {episode}")
+    flown = episode * cohort.scenario.num_slots
+    if not ((stopped >= 0) & (stopped <= flown)).all():
+        raise InputError(f"{name}.stopped: expected slots up to {flown}")
     if not (best < torch.inf).all():
         raise InputError(f"{name}.best_evaluation: expected finite numbers, or minus infinity")
     for key, weights in state["best_weights"].items():

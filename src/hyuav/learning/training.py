@@ -169,7 +169,10 @@ class Training:
 
     @property
     def stopped(self) -> tuple[int, ...]:
-        """In which episode each learner stopped, for want of finite numbers; 0 for none."""
+        """In which slot each learner stopped, for want of finite numbers; 0 for none.
+
+        Slots are counted since training began.
+        """
         return tuple(self._in_order([cohort.stopped for cohort in self.cohorts]).tolist())
 
     @property
@@ -225,14 +228,14 @@ class Training:
                 flown = list(pool.map(Cohort.fly, self.cohorts))
         else:
             flown = [cohort.fly() for cohort in self.cohorts]
-        rewards, losses = zip(*flown, strict=True)
+        rewards, losses, _ = zip(*flown, strict=True)
         return Episode(
             number=self.episode,
             slots=tuple(self.episode * horizon for horizon in self.horizons),
             accumulated_reward=self._in_order(rewards),
             losses={name: self._in_order(_loss(losses, name, rewards)) for name in self.steps},
             evaluation=self._keep_best() if self._evaluation_is_due() else None,
-            learning=tuple(not episode for episode in self.stopped),
+            learning=tuple(not slot for slot in self.stopped),
         )
 
     def _compiling_pays(self) -> bool:

@@ -98,7 +98,7 @@ class Tracker:
         )
         self._started = time.perf_counter() - reported.seconds
         self._saved = time.perf_counter()
-        self._stopped = {index for index, episode in enumerate(training.stopped) if episode}
+        self._stopped = {index for index, slot in enumerate(training.stopped) if slot}
 
     def __enter__(self) -> Self:
         self._session.__enter__()
@@ -151,13 +151,12 @@ class Tracker:
         save_checkpoints(self.run, self.training, reported)
 
     def _tell_who_stopped(self, episode: Episode) -> None:
-        for index, learning in enumerate(episode.learning):
-            if not learning and index not in self._stopped:
+        for index, slot in enumerate(self.training.stopped):
+            if slot and index not in self._stopped:
                 self._stopped.add(index)
-                horizon, last = self.training.horizons[index], episode.slots[index]
                 print(
                     f"learner {index} ({self.names[index]}) stops in episode {episode.number}, "
-                    f"slots {last - horizon + 1} to {last}: its losses or weights are not finite; "
+                    f"slot {slot}: its losses or weights are not finite; "
                     "its best weights before that are kept",
                     file=sys.stderr,
                 )
