@@ -122,6 +122,7 @@ def test_metrics_can_be_read_while_they_are_written(tmp_path: Path) -> None:
         *(b"", bytes(range(256)) * 20, b"a,b\n1,2\n"),
         (",".join(METRIC_COLUMNS) + "\n1,20,0,best,3,20,1.5,,,,0.1\n").encode(),
         (",".join(METRIC_COLUMNS) + "\n1,20,0,relay,3,20,high,,,,0.1\n").encode(),
+        (",".join(METRIC_COLUMNS) + "\n1,20,0,relay,3,20,True,,,,0.1\n").encode(),
     ],
 )
 def test_metrics_that_no_training_wrote_are_refused_in_one_line(

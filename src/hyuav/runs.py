@@ -13,7 +13,6 @@ from typing import Any
 
 import pandas as pd
 from omegaconf import OmegaConf
-from pandas.api.types import is_numeric_dtype
 from torch import Tensor
 
 from hyuav.durable import create_durably
@@ -267,14 +266,14 @@ class RunDirectory:
         Raises:
             InputError: there is no such table, or it is damaged.
         """
-        numbers = [name for name in METRIC_COLUMNS if name != "scheme"]
+        numbers = set(METRIC_COLUMNS) - {"scheme"}
         try:
             with open_regular(self.metrics_file) as file:
                 metrics = pd.read_csv(file)
             whole = set(METRIC_COLUMNS) <= set(metrics.columns) and (
                 metrics.empty
                 or (
-                    all(map(is_numeric_dtype, metrics[numbers].dtypes))
+                    set(metrics.select_dtypes("number")) >= numbers  # truth values are none
                     and metrics["scheme"].isin(SCHEMES).all()
                 )
             )

@@ -160,8 +160,6 @@ def _has_ended(shard: Shard, run: RunDirectory) -> bool:
         rows = run.metrics()
     except (OSError, ValueError):  # a refusal among them
         return False
-    if not set(rows.select_dtypes("number")) >= _NUMBERS:
-        return False
     last = rows["episode"] == training.num_episodes
     evaluated = rows[last | (rows["episode"] % training.evaluation_every == 0)]
     flown = rows.drop_duplicates(["learner", "episode"])
