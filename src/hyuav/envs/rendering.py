@@ -34,8 +34,7 @@ OKABE_ITO = {
 }
 """Okabe and Ito's palette, which the colour-blind can tell apart."""
 
-LEGITIMATE_COLOR = OKABE_ITO["blue"]
-EAVESDROPPER_COLOR = OKABE_ITO["vermillion"]
+LEGITIMATE_COLOR, EAVESDROPPER_COLOR = "#5A5A5A", "#222222"  # the palette is for schemes and modes
 HELPER_COLOR = OKABE_ITO["bluish green"]
 UE_COLOR = OKABE_ITO["black"]
 
@@ -215,13 +214,14 @@ def _draw_uav(axes: Axes, position: Point, label: str, style: dict[str, Any]) ->
     axes.plot(*position, linestyle="", label=label, clip_on=False, **scaled)
 
 
-_LEGITIMATE: dict[str, Any] = {
+_RIM: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.4}  # on dark maps
+_LEGITIMATE: dict[str, Any] = _RIM | {
     "color": LEGITIMATE_COLOR,
     "marker": "s",
     "markersize": 1.8,
     "zorder": 2,
 }
-_EAVESDROPPER: dict[str, Any] = {
+_EAVESDROPPER: dict[str, Any] = _RIM | {
     "color": EAVESDROPPER_COLOR,
     "marker": "v",
     "markersize": 2.3,
