@@ -5,7 +5,6 @@ python examples/gpu.py
 
 import dataclasses
 import time
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -14,7 +13,7 @@ from hyuav import DDPG, Learner, RobustDDPG, Scenario, Training, TrainingParamet
 from hyuav.learning.algorithms import SAC, AlgorithmParameters
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
-SHORT: dict[str, Any] = {"warm_up_episodes": 5, "restart_after": 12}
+SHORT = RobustDDPG(warm_up_episodes=5)
 
 
 def train(
@@ -51,7 +50,7 @@ def fly(helpers: int, *, compiled: bool) -> float:
 def main() -> None:
     """Print what was found."""
     print(f"PyTorch {torch.__version__}, {torch.cuda.get_device_name()}")
-    for algorithm in (DDPG(), RobustDDPG(**SHORT), SAC()):
+    for algorithm in (DDPG(), SHORT, SAC()):
         name = type(algorithm).__name__
         expected, _ = train(algorithm, "cpu", compiled=False, learners=3, episodes=20)
         for compiled in (False, True):
@@ -59,7 +58,7 @@ def main() -> None:
             apart = (found - expected).abs().max()
             print(f"{name}, compiled={compiled}: at most {apart:.1e} bps/Hz from the CPU's rewards")
     for learners in (16, 256):
-        for algorithm in (DDPG(), RobustDDPG(**SHORT)):
+        for algorithm in (DDPG(), SHORT):
             _, seconds = train(algorithm, "cuda", compiled=True, learners=learners, episodes=60)
             rate = learners / seconds
             print(f"{type(algorithm).__name__}, {learners} learners: {rate:,.0f} steps/s")

@@ -27,15 +27,13 @@ PROCESSES.set_forkserver_preload(["killed_training"])
 
 
 def small(compile_slots: str, num_episodes: int = 12) -> RunConfiguration:
-    """With a warm-up, two horizons on two threads, repeated flights, restarts and checkpoints."""
+    """With a warm-up, two horizons on two threads, repeated flights and checkpoints."""
     return RunConfiguration(
         "two_clusters",
         dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6),
         (Learner("hybrid", 3), Learner("relay", 3, 8), Learner("jamming", 4)),
         "ddpg_robust",
-        RobustDDPG(
-            hidden_sizes=(16,), warm_up_episodes=3, restart_after=9, actor_learning_rate=3e-3
-        ),
+        RobustDDPG(hidden_sizes=(16,), warm_up_episodes=3, actor_learning_rate=3e-3),
         TrainingParameters(
             num_episodes=num_episodes,
             replay_size=40,

@@ -48,7 +48,7 @@ def test_few_algorithms_are_set_beside_each_other(capsys: pytest.CaptureFixture[
 
 
 def test_many_algorithms_are_set_beside_the_first(capsys: pytest.CaptureFixture[str]) -> None:
-    pieces = ("clock", "discount", "geofence", "learning_rate_decay", "saturation_penalty")
+    pieces = ("clock", "layer_norm", "geofence", "warm_up_episodes", "repeat_every")
     entries = ["ddpg_robust", *(f"ddpg_robust-{piece}" for piece in pieces)]
     lines = printed(entries, capsys)
     for entry in entries[1:]:

@@ -49,14 +49,6 @@ def test_learners_are_disturbed_independently() -> None:
     assert (correlation - torch.eye(4)).abs().max() < 0.06
 
 
-def test_noise_stays_above_its_floor() -> None:
-    torch.manual_seed(0)
-    noise = GaussianNoise(20_000, variance=0.6, decay=0.1, decay_per="slot", floor=0.05)
-    for _ in range(9):
-        action = noise(slot(20_000))["action"]
-    assert action.std().item() == pytest.approx(0.05, rel=0.03)
-
-
 SCENARIO = Scenario.preset("two_clusters")
 
 

@@ -35,7 +35,7 @@ def flown(trained: Cohort) -> torch.Tensor:
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_every_nth_episode_takes_the_actions_of_each_learners_best(compiled: bool) -> None:
-    trained = cohort(repeat_every=3, warm_up_episodes=2, restart_after=14)
+    trained = cohort(repeat_every=3, warm_up_episodes=2)
     rewards: list[torch.Tensor] = []
     flights: list[torch.Tensor] = []
     repeated = []

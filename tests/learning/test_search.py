@@ -125,26 +125,6 @@ def test_what_was_imagined_is_flown_after_the_warm_up(
     torch.testing.assert_close(stored, tried)
 
 
-def test_an_actor_that_is_behind_is_not_sent_back_to_its_best_weights() -> None:
-    trained = cohort(restart_after=4)
-    for _ in range(4):
-        trained.fly()
-    best(trained).behind.copy_(torch.tensor([True, False]))
-    earned = trained.evaluate(10, seed=0)
-    trained.keep_best(earned)
-    with torch.no_grad():
-        for weights in trained.algorithm.loss.actor_network_params.values(True, True):
-            weights.add_(1.0)
-    before = [w.clone() for w in trained.algorithm.loss.actor_network_params.values(True, True)]
-    best(trained).behind.copy_(torch.tensor([True, False]))
-    trained.keep_best(earned._replace(reward=earned.reward - 1.0))
-    after = list(trained.algorithm.loss.actor_network_params.values(True, True))
-    assert all(torch.equal(a[0], b[0]) for a, b in zip(after, before, strict=True))
-    assert all(
-        torch.allclose(a[1], b[1] - 1.0, atol=1e-6) for a, b in zip(after, before, strict=True)
-    )
-
-
 def test_the_search_goes_on_with_a_training_that_is_resumed() -> None:
     first, second = cohort(), cohort()
     for _ in range(6):

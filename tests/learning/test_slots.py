@@ -38,7 +38,7 @@ compared, and no flight is imagined that it would choose."""
 
 def cohort(name: str, scenario: Scenario = SCENARIO, batch_size: int = 8) -> Cohort:
     short: dict[str, Any] = (
-        {"warm_up_episodes": 3, "repeat_every": 2, "restart_after": 5, "imagined_flights": 0}
+        {"warm_up_episodes": 3, "repeat_every": 2, "imagined_flights": 0}
         if name.endswith("robust")
         else {}
     )

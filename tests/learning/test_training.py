@@ -194,25 +194,6 @@ def test_learners_fly_their_own_schemes_and_horizons() -> None:
     assert trained.horizons == (3, 5, 3, 5)
 
 
-@pytest.mark.parametrize("restart_after", [0, 3])
-def test_actors_that_restart_go_on_from_their_best(restart_after: int) -> None:
-    algorithm = ALGORITHMS["ddpg"](
-        hidden_sizes=(16, 8), restart_after=restart_after, actor_learning_rate=1e-2
-    )
-    parameters = dataclasses.replace(SHORT, num_episodes=8, evaluation_every=1)
-    trained = Training(SCENARIO, PAIR, algorithm, parameters)
-    gone_back = [episode.number for episode in trained.episodes() if _at_best(trained)]
-    if restart_after:
-        assert set(gone_back) >= set(range(restart_after, 9))
-    else:
-        assert len(gone_back) < 8
-
-
-def _at_best(trained: Training) -> bool:
-    """Whether all actors are now what they were at their best."""
-    return torch.equal(trained.evaluate().reward, trained.best_evaluation)
-
-
 def test_a_clock_lengthens_the_observation_by_one() -> None:
     algorithm = ALGORITHMS["ddpg"](hidden_sizes=(16, 8), clock=True)
     trained = Training(SCENARIO, PAIR, algorithm, SHORT)

@@ -14,7 +14,6 @@ from hyuav.learning.weights import (
     join_learners,
     load_weights,
     replace_learners,
-    restore_actors,
     select_learner,
 )
 
@@ -104,23 +103,3 @@ def test_joined_learners_are_counted_and_selected_again() -> None:
     assert [count_learners(each) for each in (*several, joined)] == [1, 2, 3]
     last = select_learner(joined, 2)
     assert all(torch.equal(last[key], select_learner(several[1], 1)[key]) for key in last)
-
-
-@pytest.mark.parametrize("name", sorted(ALGORITHMS))
-def test_restored_actors_act_as_before_and_critics_stay(name: str) -> None:
-    algorithm = ALGORITHMS[name](clock=False, hidden_sizes=(8,)).build(3, TEN_UES)
-    data = TensorDict(observation=torch.randn(3, 6, 15), batch_size=[3, 6])
-    before, weights = algorithm.actor(data.clone())["action"], copy_weights(algorithm.loss)
-    with torch.no_grad():
-        for values in algorithm.loss.parameters():
-            values.add_(1.0)
-    changed = algorithm.actor(data.clone())["action"]
-    restore_actors(algorithm.loss, weights, torch.tensor([True, False, True]))
-    after = algorithm.actor(data.clone())["action"]
-    torch.testing.assert_close(after[0::2], before[0::2])
-    torch.testing.assert_close(after[1], changed[1])
-    for key, values in copy_weights(algorithm.loss).items():
-        if key.startswith("target_actor"):
-            assert torch.equal(values[0], weights[key.removeprefix("target_")][0])
-        elif "value" in key and not key.startswith("target"):
-            torch.testing.assert_close(values, weights[key] + 1.0)

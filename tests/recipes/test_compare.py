@@ -169,18 +169,18 @@ def test_shards_of_random_layouts_and_of_a_peer_train_in_processes(
 def test_a_variant_is_compared_without_its_pieces(
     call: Call, tmp_path: Path, capsys: Printed
 ) -> None:
-    pieces = ["algorithm=[ddpg,ddpg_robust]", "without=[clock,restart_after]"]
+    pieces = ["algorithm=[ddpg,ddpg_robust]", "without=[clock,repeat_every]"]
     call(
         "compare", *pieces, *TINY_COMPARISON, "scenario=two_clusters", "scheme=relay", "learners=1"
     )
     here = tmp_path / "here"
-    entries = ["ddpg", "ddpg_robust", "ddpg_robust-clock", "ddpg_robust-restart_after"]
+    entries = ["ddpg", "ddpg_robust", "ddpg_robust-clock", "ddpg_robust-repeat_every"]
     assert pd.read_parquet(here / "results.parquet")["algorithm"].tolist() == entries
     run = RunDirectory(here / "shards" / "ddpg_robust-clock_two_clusters_T8")
     assert run.configuration().algorithm == RobustDDPG(clock=False)
     printed = capsys.readouterr().out
     assert "without clock" in printed
-    assert "without restart after" in printed
+    assert "without repeat every" in printed
 
 
 def test_a_directory_of_another_comparison_is_left_alone(refusal: Refusal, tmp_path: Path) -> None:

@@ -12,11 +12,11 @@ from hyuav.report.comparison import comparison_page
 SCENARIOS = ["two_clusters", "random_disk"]
 ASKED = {
     "algorithm": ["sac", "ddpg_robust", "ddpg"],
-    "without": ["restart_after", "clock"],
+    "without": ["repeat_every", "clock"],
     "scenario": SCENARIOS,
     "num_slots": [9, 10],
 }
-VARIANTS = ["ddpg_robust", "ddpg_robust-restart_after", "ddpg_robust-clock"]
+VARIANTS = ["ddpg_robust", "ddpg_robust-repeat_every", "ddpg_robust-clock"]
 
 
 def shards(directory: Path) -> None:

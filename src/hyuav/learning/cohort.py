@@ -25,7 +25,6 @@ from hyuav.learning.weights import (
     forget_moments,
     load_weights,
     replace_learners,
-    restore_actors,
 )
 from hyuav.parameters import Parameters, choice, count, optional, parameter
 from hyuav.randomness import RowStream, derived_seed, given_normals, standard_normal, uniform
@@ -192,7 +191,6 @@ class Cohort:
         count any more.
         """
         self.episode += 1
-        self.algorithm.set_learning_rates(self.episode)
         flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
         self._keep_flight()
         self._stop_where_not_finite(flown)
@@ -240,7 +238,7 @@ class Cohort:
         if self.env.base_env.system.edge_can_saturate:
             blocks["tasks"] = draws.take_tasks(slots).contiguous()
         carrier = self.collector._carrier
-        flown = compiled.fly(carrier, blocks, self.updates, self.episode)
+        flown = compiled.fly(carrier, blocks, self.updates)
         self.updates += slots
         carrier.update(self.env.reset())
         return flown
@@ -307,20 +305,13 @@ class Cohort:
         return Earned(fair, sum_rate, torch.stack(way))
 
     def keep_best(self, earned: Earned) -> None:
-        """Where a learner never earned more than ``earned``, its weights are the best.
-
-        Where it did, and the algorithm restarts, its actor goes on from the best; but not one that
-        is on its way to a better flight.
-        """
+        """Where a learner never earned more than ``earned``, its weights are the best."""
         flights = self.algorithm.best_flights
         better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
         self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
         replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
         if flights is not None:
             flights.own_way.copy_(earned.way)
-        if self.algorithm.restarts(self.episode):
-            stays = better if flights is None else better | flights.behind
-            restore_actors(self.algorithm.loss, self.best_weights, ~stays)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that evolves; the tensors are the cohort's own."""

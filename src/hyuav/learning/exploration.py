@@ -38,17 +38,14 @@ class GaussianNoise(TensorDictModuleBase):
         variance: of the noise in the first slot, in units of v_max squared.
         decay: factor of the standard deviation.
         decay_per: "slot" or "episode".
-        floor: that the standard deviation does not fall below.
     """
 
     in_keys = ("action", "step_count")
     out_keys = ("action",)
 
-    def __init__(
-        self, learners: int, variance: float, decay: float, decay_per: str, floor: float = 0.0
-    ) -> None:
+    def __init__(self, learners: int, variance: float, decay: float, decay_per: str) -> None:
         super().__init__()
-        self.decay, self.decay_per, self.floor = decay, decay_per, floor
+        self.decay, self.decay_per = decay, decay_per
         self.register_buffer("std", torch.full((learners, 1), variance**0.5))
         self.register_buffer("fresh", torch.ones(learners, 1, dtype=torch.bool))
 
@@ -61,7 +58,7 @@ class GaussianNoise(TensorDictModuleBase):
         self.std.mul_(torch.where(finished, self.decay, 1.0))
         self.fresh.fill_(False)
         action = tensordict["action"]
-        noisy = action + self.std.clamp(min=self.floor) * torch.randn_like(action)
+        noisy = action + self.std * torch.randn_like(action)
         tensordict["action"] = noisy.clamp(-1.0, 1.0)
         return tensordict
 

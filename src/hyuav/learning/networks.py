@@ -79,12 +79,8 @@ class LearnerMLP(nn.Module):
 
         A single slot of each learner, (N, k), is taken as well.
         """
-        outputs: Tensor = self.output(self.before_output(*inputs))
+        outputs: Tensor = self.output(_over_rows(self.layers, *inputs))
         return outputs
-
-    def before_output(self, *inputs: Tensor) -> Tensor:
-        """The same up to the last layer's result, before ``output`` is applied to it."""
-        return _over_rows(self.layers, *inputs)
 
     def hidden(self, *inputs: Tensor) -> Tensor:
         """The same up to the last hidden layer's result."""

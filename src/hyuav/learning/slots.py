@@ -90,9 +90,7 @@ class CompiledSlots:
             for taken in algorithm.all_due
         }
 
-    def fly(
-        self, carrier: TensorDictBase, draws: Mapping[str, Tensor], updates: int, episode: int
-    ) -> Flown:
+    def fly(self, carrier: TensorDictBase, draws: Mapping[str, Tensor], updates: int) -> Flown:
         """Fly and learn for as many slots as there are draws.
 
         Args:
@@ -104,12 +102,11 @@ class CompiledSlots:
                 where the algorithm repeats flights; ``fading`` (slots, N, 3 U + 2) and ``tasks``
                 (slots, N, 2, U) where the environment needs them.
             updates: taken before.
-            episode: which one it is, from 1.
         """
         slots = len(draws["exploration"])
         self._begin(carrier)
         counts = dict.fromkeys(self._adam, 0)
-        blocks = {**draws, "corrections": self._corrections(updates, slots, episode)}
+        blocks = {**draws, "corrections": self._corrections(updates, slots)}
         with torch.no_grad():
             rows = zip(*(blocks[name] for name in self._names), strict=True)
             for slot, inputs in enumerate(rows):
@@ -137,18 +134,14 @@ class CompiledSlots:
         for step in self._algorithm.steps:
             self._adam[step.name].set_count(updates // step.every)
 
-    def _corrections(self, updates: int, slots: int, episode: int) -> Tensor:
-        """Adam's bias corrections in each slot and gradient step: (slots, steps, 2).
-
-        The first is multiplied by the factor of the episode's learning rates.
-        """
+    def _corrections(self, updates: int, slots: int) -> Tensor:
+        """Adam's bias corrections in each slot and gradient step: (slots, steps, 2)."""
         exact = {"dtype": torch.float64, "device": self._env.device}
         index = torch.arange(updates + 1, updates + slots + 1, **exact).unsqueeze(-1)
         every = torch.tensor([step.every for step in self._algorithm.steps], **exact)
         betas = [self._adam[step.name].betas for step in self._algorithm.steps]
         powers = torch.tensor(betas, **exact) ** (index // every).unsqueeze(-1)
         first, second = (1.0 / (1.0 - powers)).unbind(dim=-1)
-        first = first * self._algorithm.learning_rate_factor(episode)
         return torch.stack([first, second.sqrt()], dim=-1).float()
 
     def _examples(self, batch_size: int) -> dict[str, Tensor]:
@@ -251,7 +244,7 @@ class AdamState:
                     state["exp_avg_sq"] = torch.zeros_like(weight)
                 moments = state["exp_avg"], state["exp_avg_sq"]
                 self.weights.append(weight)
-                self._rows.append((weight.data, *moments, state["step"], group["initial_lr"]))
+                self._rows.append((weight.data, *moments, state["step"], group["lr"]))
 
     def set_count(self, count: int) -> None:
         """How many steps have been taken."""

@@ -22,8 +22,6 @@ counted = count(0, 2**53)
 BEGIN = ("step_count", "done", "terminated", "truncated")
 """Zero where a flight begins, as between two episodes."""
 
-RATES = ("lr", "initial_lr")
-
 
 def require_entries(name: str, value: Any, expected: Collection[Any]) -> None:
     """Accept a dict of these keys.
@@ -148,8 +146,7 @@ def _require_optimizer(name: str, value: Any, optimizer: torch.optim.Optimizer) 
     for index, own in enumerate(example["param_groups"]):
         group = f"{name}.param_groups[{index}]"
         require_entries(group, groups[index], own)
-        rates = {key: number(0.0, 1.0)(f"{group}.{key}", groups[index][key]) for key in RATES}
-        require_like(group, groups[index], own | rates)
+        require_like(group, groups[index], own)
     weights = [weight for group in optimizer.param_groups for weight in group["params"]]
     if not isinstance(value["state"], dict):
         raise InputTypeError(rejection(f"{name}.state", value["state"], "moments by weight"))

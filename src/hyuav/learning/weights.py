@@ -81,15 +81,6 @@ def forget_moments(optimizer: torch.optim.Optimizer, where: Tensor) -> None:
             state[name].masked_fill_(_mask(where, state[name]), 0.0)
 
 
-def restore_actors(loss: LossModule, weights: dict[str, Tensor], where: Tensor) -> None:
-    """Let the actors and target actors of the learners ``where`` (N,) act as ``weights`` do."""
-    actor, target = "actor_network_params.", "target_actor_network_params."
-    for name, values in loss.state_dict().items():
-        if values.ndim and name.startswith((actor, target)):
-            by = weights[actor + name.removeprefix("target_").removeprefix(actor)]
-            replace_learners({name: values}, {name: by}, where)
-
-
 def count_learners(weights: dict[str, Tensor]) -> int:
     """Of how many learners the weights are."""
     values = next(iter(weights.values()))

@@ -42,8 +42,6 @@ class AlgorithmParameters(Parameters, ABC):
     activation: str = parameter(choice(*ACTIVATIONS), "tanh")
     actor_learning_rate: float = parameter(learning_rate, 1e-4)
     critic_learning_rate: float = parameter(learning_rate, 1e-4)
-    learning_rate_decay: float = parameter(number(0.0, 1.0), 1.0)
-    """Factor of all learning rates after every episode."""
     discount: float = parameter(number(0.0, 1.0), 0.95, symbol="gamma")
     target_rate: float = parameter(number(0.0, 1.0), 0.005, symbol="tau")
     clock: bool = parameter(switch, False)
@@ -63,9 +61,6 @@ class AlgorithmParameters(Parameters, ABC):
     repeat_every: int = parameter(count(0), 0)
     """After the warm-up, every n-th episode takes the actions of the best flight so far, or of one
     that may be better; 0 for never. See :class:`hyuav.learning.search.FlightSearch`."""
-    restart_after: int = parameter(count(0), 0)
-    """Episodes from which on an actor that is evaluated and found worse than it was goes on from
-    its best weights; 0 for never."""
     control_variate: bool = parameter(switch, False)
     """Take off each reward what its slot's fading brought; see
     :class:`hyuav.learning.control_variate.ControlVariate`."""
@@ -198,20 +193,6 @@ class Algorithm:
     """What flights are expected to earn, if it is learned, and with it the control variate, which
     takes the luck of the fading off the rewards of a mini-batch."""
 
-    def learning_rate_factor(self, episode: int) -> float:
-        """Of the learning rates in an episode, from 1."""
-        return self.parameters.learning_rate_decay ** (episode - 1)
-
-    def set_learning_rates(self, episode: int) -> None:
-        """Let the optimizers know what episode it is."""
-        for step in self.steps:
-            for group in step.optimizer.param_groups:
-                group["lr"] = group["initial_lr"] * self.learning_rate_factor(episode)
-
-    def restarts(self, episode: int) -> bool:
-        """Whether actors go back to their best weights after this episode's evaluation."""
-        return 0 < self.parameters.restart_after <= episode
-
     def repeats(self, episode: int) -> bool:
         """Whether an episode, from 1, takes the actions of the flight that is to be tried."""
         every = self.parameters.repeat_every
@@ -274,5 +255,4 @@ class Algorithm:
 
 def adam(weights: TensorDictParams | nn.Module, learning_rate: float) -> torch.optim.Adam:
     """Adam as the paper uses it, in PyTorch's fused form."""
-    group = {"params": list(weights.parameters()), "initial_lr": learning_rate}
-    return torch.optim.Adam([group], lr=learning_rate, fused=True)
+    return torch.optim.Adam(list(weights.parameters()), lr=learning_rate, fused=True)

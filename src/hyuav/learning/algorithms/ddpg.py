@@ -17,9 +17,6 @@ from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import choice, number, parameter
 from hyuav.scenario import Scenario
 
-UNSATURATED = 2.0
-"""An output before the tanh that still can be turned."""
-
 CLEARLY = 0.025
 """Scaled reward by which an alternative must be worth more; where hovering just so is all that
 matters, the best actions are near, and gradients find them."""
@@ -32,12 +29,8 @@ class DDPG(AlgorithmParameters):
     noise_variance: float = parameter(number(0.0, 1e6), 0.6)
     noise_decay: float = parameter(number(0.0, 1.0), 0.999)
     noise_decay_per: str = parameter(choice("slot", "episode"), "slot")
-    noise_floor: float = parameter(number(0.0, 1.0), 0.0)
-    """Of the standard deviation."""
     action_stretch: float = parameter(number(1.0, 2.0), 1.0)
     """Of the actor's tanh; see :class:`hyuav.learning.networks.StretchedTanh`."""
-    saturation_penalty: float = parameter(number(0.0, 1e6), 0.0)
-    """Weight of :func:`saturation` in the actor's loss."""
     alternatives_weight: float = parameter(number(0.0, 1e6), 0.0)
     """How strongly the actor is drawn to the better of :meth:`alternatives` where that is worth
     more than what it does; with any weight, the critics' target counts whichever is worth more."""
@@ -71,7 +64,7 @@ class DDPG(AlgorithmParameters):
                 GradientStep("critic", lambda batch: loss.loss_value(batch)[0], critic_optimizer),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.loss_actor(batch)[0] + self.restrained(loss, flights, batch),
+                    lambda batch: loss.loss_actor(batch)[0] + self.missed(loss, flights, batch),
                     actor_optimizer,
                 ),
             ),
@@ -95,13 +88,7 @@ class DDPG(AlgorithmParameters):
 
     def noise(self, learners: int) -> GaussianNoise:
         """What is added to the actions of N learners."""
-        return GaussianNoise(
-            learners,
-            self.noise_variance,
-            self.noise_decay,
-            self.noise_decay_per,
-            self.noise_floor,
-        )
+        return GaussianNoise(learners, self.noise_variance, self.noise_decay, self.noise_decay_per)
 
     def best_alternative(
         self, loss: LossModule, flights: BestFlights
@@ -139,25 +126,6 @@ class DDPG(AlgorithmParameters):
                 values.append(network.module(observed, actions))
         return torch.stack(values).amin(dim=0)
 
-    def restrained(
-        self, loss: LossModule, flights: BestFlights, batch: TensorDictBase
-    ) -> Tensor | float:
-        """What is added to the actor's loss, so that it does not stick: (N, K)."""
-        if not (self.saturation_penalty or self.alternatives_weight):
-            return 0.0
-        observation = batch["observation"]
-        with loss.actor_network_params.to_module(loss.actor_network, preserve_module_state=False):
-            network = loss.actor_network.module
-            output = network.before_output(observation)
-            action = network.output(output)
-        added: Tensor | float = 0.0
-        if self.saturation_penalty:
-            added = added + self.saturation_penalty * saturation(output)
-        if self.alternatives_weight:
-            missed = self.missed(loss, flights, observation, action)
-            added = added + self.alternatives_weight * missed
-        return added
-
     def alternatives(self, flights: BestFlights, observation: Tensor) -> Tensor:
         """Other ways to act than the actor's: to hover and, with a clock, to join the best flight.
 
@@ -177,22 +145,27 @@ class DDPG(AlgorithmParameters):
         return torch.stack([hovering, flights.towards(observation)], dim=1)
 
     def missed(
-        self, loss: LossModule, flights: BestFlights, observation: Tensor, action: Tensor
-    ) -> Tensor:
-        """Squared distance of the actor from the best alternative, 0 where none is clearly better.
+        self, loss: LossModule, flights: BestFlights, batch: TensorDictBase
+    ) -> Tensor | float:
+        """What is added to the actor's loss, so that it does not stick.
 
-        An actor whose whole flight is behind the best one is to join that, whatever its critics
-        hold of a single action.
+        It is the weighed squared distance from the best alternative, 0 where none is clearly
+        better. An actor whose whole flight is behind the best one is to join that, whatever its
+        critics hold of a single action.
 
         Args:
-            loss: with the critics.
+            loss: with the networks.
             flights: the best so far.
-            observation: (N, K, U + 5).
-            action: (N, K, 2), what the actor does.
+            batch: (N, K) transitions.
 
         Returns:
-            (N, K).
+            (N, K), or 0 where alternatives are not weighed.
         """
+        if not self.alternatives_weight:
+            return 0.0
+        observation = batch["observation"]
+        with loss.actor_network_params.to_module(loss.actor_network, preserve_module_state=False):
+            action = loss.actor_network.module(observation)
         others = self.alternatives(flights, observation)
         weights = getattr(loss, f"{self.critic_name}_params").data
         worth, best = self.rate(loss, weights, observation, others).squeeze(-1).max(dim=1)
@@ -203,19 +176,4 @@ class DDPG(AlgorithmParameters):
             behind = flights.behind.unsqueeze(-1)
             chosen = torch.where(behind.unsqueeze(-1), others[:, 1], chosen)
             better = better | behind
-        return better * (action - chosen).square().sum(dim=-1)
-
-
-def saturation(output: Tensor) -> Tensor:
-    """How far an actor's outputs before the tanh lie beyond :data:`UNSATURATED`.
-
-    There the tanh is flat, and an actor that has gone far does not feel a better action elsewhere.
-
-    Args:
-        output: (..., 2).
-
-    Returns:
-        (...) sums of squares over both components.
-    """
-    beyond = output.abs() - UNSATURATED
-    return beyond.clamp(min=0.0).square().sum(dim=-1)
+        return self.alternatives_weight * better * (action - chosen).square().sum(dim=-1)

@@ -18,8 +18,6 @@ class Robust(AlgorithmParameters):
 
     actor_learning_rate: float = parameter(learning_rate, 3e-4)
     critic_learning_rate: float = parameter(learning_rate, 3e-4)
-    learning_rate_decay: float = parameter(number(0.0, 1.0), 0.999)
-    discount: float = parameter(number(0.0, 1.0), 1.0, symbol="gamma")
     target_rate: float = parameter(number(0.0, 1.0), 0.01, symbol="tau")
     clock: bool = parameter(switch, True)
     geofence: bool = parameter(switch, True)
@@ -29,7 +27,6 @@ class Robust(AlgorithmParameters):
     afterstate: bool = parameter(switch, True)
     warm_up_episodes: int = parameter(count(0), 100)
     repeat_every: int = parameter(count(0), 4)
-    restart_after: int = parameter(count(0), 200)
     control_variate: bool = parameter(switch, True)
     imagined_flights: int = parameter(count(0, 100_000), 64)
 
@@ -41,9 +38,7 @@ class RobustDDPG(Robust, DDPG):
     noise_variance: float = parameter(number(0.0, 1e6), 0.16)
     noise_decay: float = parameter(number(0.0, 1.0), 0.985)
     noise_decay_per: str = parameter(choice("slot", "episode"), "episode")
-    noise_floor: float = parameter(number(0.0, 1.0), 0.1)
     action_stretch: float = parameter(number(1.0, 2.0), 1.04)
-    saturation_penalty: float = parameter(number(0.0, 1e6), 0.1)
     alternatives_weight: float = parameter(number(0.0, 1e6), 0.1)
 
 

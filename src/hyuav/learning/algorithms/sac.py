@@ -96,11 +96,7 @@ class SAC(AlgorithmParameters):
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         actor_optimizer.add_param_group(
-            {
-                "params": [loss.log_alpha],
-                "lr": self.temperature_learning_rate,
-                "initial_lr": self.temperature_learning_rate,
-            }
+            {"params": [loss.log_alpha], "lr": self.temperature_learning_rate}
         )
         mean = TensorDictModule(nn.Tanh(), in_keys=["loc"], out_keys=["action"])
         return Algorithm(

@@ -56,7 +56,7 @@ class TD3(DDPG):
                 ),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.actor_loss(batch)[0] + self.restrained(loss, flights, batch),
+                    lambda batch: loss.actor_loss(batch)[0] + self.missed(loss, flights, batch),
                     actor_optimizer,
                     every=self.actor_every,
                 ),
