@@ -47,6 +47,9 @@ METRIC_COLUMNS = (
 ``evaluation`` is noise-free, ``sum_rate`` the same without the off-map penalty.
 """
 
+METRIC_NUMBERS = frozenset(METRIC_COLUMNS) - {"scheme"}
+"""Those of them that hold numbers."""
+
 
 @dataclass(frozen=True)
 class RunConfiguration:
@@ -266,14 +269,13 @@ class RunDirectory:
         Raises:
             InputError: there is no such table, or it is damaged.
         """
-        numbers = set(METRIC_COLUMNS) - {"scheme"}
         try:
             with open_regular(self.metrics_file) as file:
                 metrics = pd.read_csv(file)
             whole = set(METRIC_COLUMNS) <= set(metrics.columns) and (
                 metrics.empty
                 or (
-                    set(metrics.select_dtypes("number")) >= numbers  # truth values are none
+                    set(metrics.select_dtypes("number")) >= METRIC_NUMBERS  # truth values are none
                     and metrics["scheme"].isin(SCHEMES).all()
                 )
             )

@@ -17,12 +17,11 @@ from hyuav.durable import rename_durably, write_durably
 from hyuav.errors import BusyError, Halted, InputError, rejection
 from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
 from hyuav.experiment import LEARNED, learned_policies, resume, train
-from hyuav.runs import METRIC_COLUMNS, RunConfiguration, RunDirectory
+from hyuav.runs import METRIC_NUMBERS, RunConfiguration, RunDirectory
 from hyuav.tracking import LoggerParameters, in_group
 
 TABLES = RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
 
-_NUMBERS = {*METRIC_COLUMNS} - {"scheme"}
 _IDENTITY = {"algorithm", "scenario", "scheme", "num_slots", "seed"}
 _RESULTS = _IDENTITY | {
     *("sum_rate", "optimum", "fraction", "seconds"),
@@ -165,7 +164,7 @@ def _has_ended(shard: Shard, run: RunDirectory) -> bool:
     flown = rows.drop_duplicates(["learner", "episode"])
     return (
         len(rows) == len(flown) == len(configuration.learners) * training.num_episodes
-        and not evaluated[[*_NUMBERS]].isna().to_numpy().any()
+        and not evaluated[[*METRIC_NUMBERS]].isna().to_numpy().any()
     )
 
 

@@ -245,16 +245,15 @@ class Cohort:
 
     def _fly_slots(self) -> Flown:
         reward = torch.zeros(len(self.learners), device=self.env.device)
-        unbroken, finite = reward == 0.0, reward.long()
+        unbroken = torch.ones_like(self.stopped, dtype=torch.bool)
+        finite = torch.zeros_like(self.stopped)
         losses: list[dict[str, Tensor]] = []
         for _ in range(self.scenario.num_slots):
             transition = next(self._transitions)[:, 0]
             reward += transition["next", "reward"].squeeze(-1)
             self.replay.extend(self.algorithm.parameters.memory.transition(transition).unsqueeze(0))
-            if len(self.replay) >= self.batch_size:
-                losses.append(self._learn())
-                unbroken = unbroken & all_finite(losses[-1].values())
-            unbroken = unbroken & reward.isfinite()
+            losses.append(self._learn() if len(self.replay) >= self.batch_size else {})
+            unbroken &= all_finite((reward, *losses[-1].values()))
             finite += unbroken
         return Flown(reward, _mean(losses), finite)
 
