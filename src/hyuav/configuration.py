@@ -11,6 +11,7 @@ import re
 import shlex
 import signal
 import sys
+from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,6 +31,7 @@ from hyuav.errors import (
     Halted,
     InputError,
     Interrupted,
+    brief,
     harmless,
     one_line,
     rejection,
@@ -140,6 +142,7 @@ def recipe(
             one_line = mock.patch.object(argparse.ArgumentParser, "print_usage")
             try:
                 loaded()  # from here on an interruption is answered below
+                _refuse_below_values(node, groups)
                 with one_line:
                     hydra.main(version_base=None, config_path=None, config_name=name)(run)()
             except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
@@ -155,6 +158,27 @@ def recipe(
         return command
 
     return decorate
+
+
+def _refuse_below_values(node: Mapping[str, Any], groups: Iterable[str]) -> None:
+    """Accept only overrides of entries, not of what would lie below a single value or a list.
+
+    Raises:
+        InputError: naming the override.
+    """
+    repository = ConfigStore.instance().repo
+    members = {group: [each.node for each in repository[group].values()] for group in groups}
+    known = {**node, **{group: dict(ChainMap(*nodes)) for group, nodes in members.items()}}
+    for argument in sys.argv[1:]:
+        path = argument.partition("=")[0].lstrip("+~").split(".")
+        below: Any = known
+        for depth, key in enumerate(path):
+            if not isinstance(below, Mapping):
+                whole = ".".join(path[:depth])
+                raise InputError(f"{brief(argument)}: {whole} has no fields: set {whole}=...")
+            if key not in below:
+                break
+            below = below[key]
 
 
 def _plain(

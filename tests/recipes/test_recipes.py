@@ -264,6 +264,16 @@ REFUSALS = [
     (["train", "scenario.num_slots=???"], "scenario.num_slots = '???': expected a value"),
     (["train", "logger.mode=${nope}"], "Interpolation key 'nope' not found"),
     (["train", "+schem=relay"], "configuration: unknown field 'schem': did you mean 'scheme'?"),
+    (
+        ["train", "algorithm.hidden_sizes.x.y=3"],
+        "algorithm.hidden_sizes has no fields: set algorithm",
+    ),
+    (["train", "num_slots.x=3"], "'num_slots.x=3': num_slots has no fields: set num_slots=..."),
+    (
+        ["compare", "algorithm.clock=1"],
+        "'algorithm.clock=1': algorithm has no fields: set algorithm=",
+    ),
+    (["compare", "algorithm.x.y=1"], "'algorithm.x.y=1': algorithm has no fields: set"),
     (["train", "resume=base", "hydra.run.dir=base"], "not hydra.run.dir"),
     (["train", "resume=base", "hydra.run.dir=."], "not hydra.run.dir"),
     *(([recipe, "+foo=1"], "configuration: unknown field 'foo': one of ") for recipe in NAMED),
