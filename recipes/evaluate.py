@@ -8,6 +8,7 @@ python recipes/evaluate.py run=runs/NAME num_slots=10
 import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
 
 import dataclasses
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,7 +57,7 @@ def main(config: Config, _: Path) -> None:
     torch.set_num_threads(options.threads)
     runs = [RunDirectory(path) for path in options.run]
     first = runs[0].configuration()
-    if len({Path(path).resolve() for path in options.run}) < len(runs):
+    if len({os.path.realpath(path) for path in options.run}) < len(runs):
         raise InputError(rejection("run", list(options.run), "different run directories"))
     for run in runs[1:]:
         if run.configuration().scenario != first.scenario:
@@ -66,14 +67,12 @@ def main(config: Config, _: Path) -> None:
         scenario = dataclasses.replace(scenario, num_slots=options.num_slots)
     console = Console()
     output = runs[0].path if options.output is None else Path(options.output)
+    learned = learned_policies(runs, scenario)
     require_writable("output", output / "figures")
     for name in (EVALUATION_FILE, FLIGHTS_FILE):
         if (output / name).is_dir():
             raise InputError(rejection(name, str(output / name), "a file or none, not a directory"))
-    policies = {
-        **learned_policies(runs, scenario),
-        **reference_policies(scenario, parameters.resolution, console),
-    }
+    policies = {**learned, **reference_policies(scenario, parameters.resolution, console)}
     with make_progress(console, "evaluating") as progress:
         evaluation = evaluate(
             scenario,

@@ -109,7 +109,7 @@ def go_on(path: str, config: Config) -> None:
     """
     for name in given() - {"resume", "device", "threads"}:
         if name == "hydra.run.dir" or not name.startswith(("logger.", "hydra.")):
-            accepted = "nothing beside it but device, threads and logger"
+            accepted = "nothing beside it but device=, threads= and logger.NAME="
             raise InputError(f"{rejection('resume', path, accepted)}, not {name}")
     asked = RunDirectory(path).request()
     kept = {"device", "threads", "logger"} & asked.keys() - given()

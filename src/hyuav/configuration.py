@@ -90,26 +90,9 @@ def recipe(
         run_directory: pattern of the directory in which a run keeps its files. Those of a multirun
             stand together in one directory, by their numbers.
     """
-    store = ConfigStore.instance()
-    node: dict[str, Any] = options().to_dict()
-    node |= {section: parameters().to_dict() for section, parameters in sections.items()}
-    names = [*node, *groups]
-    sweep, _, own = run_directory.partition(f"{NOW}_")
-    node["hydra"] = {
-        "run": {"dir": run_directory},
-        "sweep": {
-            "dir": f"{sweep}{NOW}_sweep" if own else run_directory,
-            "subdir": f"${{hydra.job.num}}_{own}" if own else "${hydra.job.num}",
-        },
-        "output_subdir": None,
-    }
-    node["defaults"] = [
-        *({group: member} for group, member in groups.items()),
-        {"override hydra/job_logging": "none"},
-        {"override hydra/hydra_logging": "none"},
-        "_self_",
-    ]
-    store.store(name=name, node=node)
+    node = _node(options, groups, sections, run_directory)
+    names = [*options().to_dict(), *sections, *groups]
+    ConfigStore.instance().store(name=name, node=node)
 
     def decorate(function: Callable[[Config, Path], None]) -> Callable[[], None]:
         composed = False
@@ -139,38 +122,89 @@ def recipe(
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
             register(groups)
-            one_line = mock.patch.object(argparse.ArgumentParser, "print_usage")
-            try:
-                loaded()  # from here on an interruption is answered below
-                _refuse_below_values(node, groups)
-                with one_line:
-                    hydra.main(version_base=None, config_path=None, config_name=name)(run)()
-            except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
-                if composed and not isinstance(error, InputError):
-                    raise
-                _end(explain(error), 2)
-            except KeyboardInterrupt as error:
-                print(harmless(str(error)) or "interrupted", file=sys.stderr)
-                sys.exit(128 + (error.signal if isinstance(error, Interrupted) else signal.SIGINT))
-            except Halted as error:
-                _end(str(error), 1)
+            with _ending_in_one_line(lambda: composed):
+                loaded()  # from here on an interruption is answered
+                _refuse_overrides(node, groups)
+                hydra.main(version_base=None, config_path=None, config_name=name)(run)()
 
         return command
 
     return decorate
 
 
-def _refuse_below_values(node: Mapping[str, Any], groups: Iterable[str]) -> None:
-    """Accept only overrides of entries, not of what would lie below a single value or a list.
+def _node(
+    options: type[Parameters],
+    groups: Mapping[str, str],
+    sections: Mapping[str, Callable[[], Parameters]],
+    run_directory: str,
+) -> dict[str, Any]:
+    """The defaults of a recipe's configuration, and how Hydra is to treat them."""
+    sweep, _, own = run_directory.partition(f"{NOW}_")
+    return {
+        **options().to_dict(),
+        **{section: parameters().to_dict() for section, parameters in sections.items()},
+        "hydra": {
+            "run": {"dir": run_directory},
+            "sweep": {
+                "dir": f"{sweep}{NOW}_sweep" if own else run_directory,
+                "subdir": f"${{hydra.job.num}}_{own}" if own else "${hydra.job.num}",
+            },
+            "output_subdir": None,
+        },
+        "defaults": [
+            *({group: member} for group, member in groups.items()),
+            {"override hydra/job_logging": "none"},
+            {"override hydra/hydra_logging": "none"},
+            "_self_",
+        ],
+    }
+
+
+@contextmanager
+def _ending_in_one_line(composed: Callable[[], bool]) -> Iterator[None]:
+    """End the command with one line on what the user has to change or to know.
+
+    Args:
+        composed: whether Hydra has accepted the command line; from then on whatever is raised but
+            refusals is a fault of the program, to be seen whole.
+    """
+    try:
+        with mock.patch.object(argparse.ArgumentParser, "print_usage"):
+            yield
+    except RecursionError:
+        if composed():
+            raise
+        _end("the command line is nested too deep", 2)
+    except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
+        if composed() and not isinstance(error, InputError):
+            raise
+        _end(explain(error), 2)
+    except KeyboardInterrupt as error:
+        print(harmless(str(error)) or "interrupted", file=sys.stderr)
+        sys.exit(128 + (error.signal if isinstance(error, Interrupted) else signal.SIGINT))
+    except Halted as error:
+        _end(str(error), 1)
+
+
+def _refuse_overrides(node: Mapping[str, Any], groups: Iterable[str]) -> None:
+    """Refuse what Hydra accepts or does not explain.
 
     Raises:
-        InputError: naming the override.
+        InputError: an override of what would lie below a single value or a list; a group without
+            a member, or with a list of them; several jobs where there is no directory for each.
     """
     repository = ConfigStore.instance().repo
     members = {group: [each.node for each in repository[group].values()] for group in groups}
     known = {**node, **{group: dict(ChainMap(*nodes)) for group, nodes in members.items()}}
+    once = node["hydra"]["run"]["dir"] == "."
     for argument in sys.argv[1:]:
-        path = argument.partition("=")[0].lstrip("+~").split(".")
+        if once and argument in ("-m", "--multirun"):
+            raise InputError(f"{argument}: this recipe does a single job: leave it out")
+        name, _, value = argument.partition("=")
+        if name.lstrip("+~") in groups and (name.startswith("~") or value.startswith("[")):
+            offered = sorted(each.removesuffix(".yaml") for each in repository[name.lstrip("+~")])
+            require_choice(name, value, offered)
+        path = name.lstrip("+~").split(".")
         below: Any = known
         for depth, key in enumerate(path):
             if not isinstance(below, Mapping):
@@ -258,7 +292,10 @@ def same_call(name: str, path: Path) -> list[str]:
         name: of the entry.
         path: as :func:`override` takes it.
     """
-    others = (each for each in sys.argv[1:] if not each.startswith(f"{name}="))
+    config = HydraConfig.get()
+    one_of_several = config.mode is RunMode.MULTIRUN  # which goes on by itself
+    given = config.overrides.task if one_of_several else sys.argv[1:]
+    others = (each for each in given if not each.startswith(f"{name}="))
     return [*others, override(name, path)]
 
 

@@ -91,6 +91,17 @@ def test_an_evaluation_needs_a_place_to_write_to(
     assert "output = 'file" in refusal("evaluate", "run=run", "output=file")
 
 
+def test_runs_that_cannot_be_evaluated_leave_nothing_behind(
+    call: Call, refusal: Refusal, tmp_path: Path
+) -> None:
+    call("train", "hydra.run.dir=run", *SHORT)
+    (tmp_path / "loop").symlink_to("loop")
+    assert "run = 'loop': expected a run directory" in refusal("evaluate", "run=[run,loop]")
+    (tmp_path / "run" / "checkpoints" / "best.pt").unlink()
+    assert "best.pt" in refusal("evaluate", "run=run", "output=other")
+    assert not (tmp_path / "other").exists()
+
+
 def test_a_training_goes_on_as_it_was_configured(
     call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -268,6 +279,11 @@ REFUSALS = [
         ["train", "algorithm.hidden_sizes.x.y=3"],
         "algorithm.hidden_sizes has no fields: set algorithm",
     ),
+    (["train", "algorithm=[ddpg,td3]"], f"algorithm = '[ddpg,td3]': expected one of {NAMES}"),
+    (["reproduce", "algorithm=[ddpg,td3]"], f"algorithm = '[ddpg,td3]': expected one of {NAMES}"),
+    (["train", "~scenario"], "~scenario = '': expected one of random_disk, two_clusters"),
+    (["train", f"scheme={'[' * 300}{']' * 300}"], "the command line is nested too deep"),
+    (["report", "-m", "run=a,b"], "-m: this recipe does a single job: leave it out"),
     (["train", "num_slots.x=3"], "'num_slots.x=3': num_slots has no fields: set num_slots=..."),
     (
         ["compare", "algorithm.clock=1"],
@@ -315,7 +331,7 @@ def test_going_on_into_the_runs_own_directory_is_refused_and_loses_nothing(
 ) -> None:
     call("train", "hydra.run.dir=base", *SHORT)
     before = sorted((tmp_path / "base").rglob("*"))
-    accepted = "expected nothing beside it but device, threads and logger"
+    accepted = "expected nothing beside it but device=, threads= and logger.NAME="
     line = refusal("train", "resume=base", "hydra.run.dir=base")
     assert line == f"error: resume = 'base': {accepted}, not hydra.run.dir\n"
     assert sorted((tmp_path / "base").rglob("*")) == before
