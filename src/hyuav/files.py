@@ -6,8 +6,11 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
+import pandas as pd
 import torch
+from pyarrow.lib import ArrowException
 
+from hyuav.errors import InputError, one_line
 from hyuav.learning.memory import device_memory
 
 
@@ -41,3 +44,21 @@ def read_regular(path: Path, size: int = -1) -> bytes:
     with open_regular(path) as file:
         available = os.fstat(file.fileno()).st_size
         return file.read(min(size, available) if size >= 0 else -1)
+
+
+def read_parquet(path: Path, accepted: str, columns: list[str] | None = None) -> pd.DataFrame:
+    """The table of a Parquet file.
+
+    Args:
+        path: of the file.
+        accepted: what would be accepted there, for the refusal.
+        columns: that are read; None for all.
+
+    Raises:
+        InputError: there is none, it is damaged, or a column is missing.
+    """
+    try:
+        return pd.read_parquet(path, columns=columns)
+    except (OSError, ValueError, TypeError, LookupError, ArrowException) as error:
+        reason = one_line(str(error))[:200]
+        raise InputError(f"{path}: expected {accepted} in Parquet ({reason})") from None

@@ -117,3 +117,10 @@ def test_of_many_only_the_first_is_set_beside_the_others() -> None:
     figure = improvement_bars(improvements(learners(ENTRIES)))
     named = [text.get_text() for text in figure.axes[0].get_yticklabels()]
     assert named == [label(entry) for entry in ENTRIES[1:]]
+
+
+@pytest.mark.parametrize("entry", ["drifting", "ddpg_robust-noise_floor"])
+def test_what_is_not_offered_any_more_is_drawn_in_grey(entry: str) -> None:
+    assert color(entry) not in {to_hex(known) for known in COLORS.values()}
+    assert dash(entry) == 0
+    assert label(entry)

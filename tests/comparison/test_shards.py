@@ -13,11 +13,12 @@ from rich.console import Console
 from faults import leave_overflowing
 from hyuav import Scenario
 from hyuav.comparison.optima import Optima
-from hyuav.comparison.plan import PEER, parameters_of, training_episodes
+from hyuav.comparison.plan import parameters_of, training_episodes
 from hyuav.comparison.shards import Shard, tables
 from hyuav.errors import BusyError, InputError
 from hyuav.evaluation import EvaluationParameters, Policy, fly
 from hyuav.experiment import new_training, train
+from hyuav.learning.algorithms.registry import PEER
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.runs import RunConfiguration, RunDirectory

@@ -176,3 +176,31 @@ def test_runs_within_are_drawn_too_and_the_papers_algorithm_beside(
     assert names == {"DDPG", "DDPG, as in the paper"}
     assert drawn(within) == {"learning_curves"}
     assert not list(RunDirectory(run.path / AS_IN_PAPER).figures.iterdir())
+
+
+@pytest.mark.parametrize(
+    "name", ["trajectories", "flight_map", "energy", "offloading", "animation"]
+)
+def test_flights_that_are_not_of_the_scenario_are_named(
+    run: RunDirectory, evaluation: Evaluation, name: str
+) -> None:
+    evaluation.save(run.path)
+    flights, file = evaluation.flights, run.path / "flights.parquet"
+    fewer = {
+        column: flights[column].str[:5] for column in ("offloading", "secrecy_rate", "ue_energy")
+    }
+    for changed in (flights.assign(**fewer), flights.assign(scheme="unknown")):
+        changed.to_parquet(file)
+        with pytest.raises(InputError, match=r"flights\.parquet: expected flights over 10 UEs"):
+            draw(run, [name], console())
+
+
+def test_an_evaluation_that_does_not_count_its_learners_is_named(
+    run: RunDirectory, evaluation: Evaluation
+) -> None:
+    evaluation.save(run.path)
+    for result in (summary := json.loads(json.dumps(evaluation.summary)))["schemes"].values():
+        del result["learners"]
+    (run.path / "evaluation.json").write_text(json.dumps(summary))
+    with pytest.raises(InputError, match=r"evaluation\.json: expected an evaluation in JSON"):
+        draw(run, ["horizons"], console())

@@ -14,11 +14,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from hyuav.comparison.directory import Summary
-from hyuav.comparison.plan import ENTRIES, PEER, PIECES, Compare
+from hyuav.comparison.plan import ENTRIES, PIECES, Compare
 from hyuav.comparison.statistics import learning_curves, performance_profiles
 from hyuav.comparison.tables import MOST_COLUMNS, label
 from hyuav.envs.rendering import OKABE_ITO
 from hyuav.figures import COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
+from hyuav.learning.algorithms.registry import PEER
 
 _OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
 
@@ -27,6 +28,8 @@ COLORS = {name: OKABE_ITO[_OTHERS[i % len(_OTHERS)]] for i, name in enumerate(EN
 }
 """The same color for an algorithm in every figure."""
 
+_UNKNOWN = "#777777"
+"""Of an algorithm or a piece that is not offered now: another user's own, an earlier version's."""
 
 _DASHES: Sequence[Any] = (
     "solid",
@@ -41,13 +44,15 @@ FRACTION = "Fraction of the optimum"
 def color(entry: str) -> str:
     """An entry's color; a variant without a piece has that of the piece."""
     piece = entry.partition("-")[2]
-    return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]] if piece else COLORS[entry]
+    if piece in PIECES:
+        return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]]
+    return _UNKNOWN if piece else COLORS.get(entry, _UNKNOWN)
 
 
 def dash(entry: str) -> int:
     """Which line and marker tell an entry from others of its color; 0 of a whole algorithm."""
     piece = entry.partition("-")[2]
-    return 1 + PIECES.index(piece) // len(_OTHERS) if piece else 0
+    return 1 + PIECES.index(piece) // len(_OTHERS) if piece in PIECES else 0
 
 
 def draw(summary: Summary, options: Compare, directory: Path) -> None:

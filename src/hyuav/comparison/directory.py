@@ -11,7 +11,7 @@ import pandas as pd
 from omegaconf import OmegaConf
 
 from hyuav.comparison.optima import Optima
-from hyuav.comparison.plan import PEER, PLAIN, Compare, parameters_of, training_episodes
+from hyuav.comparison.plan import PLAIN, Compare, parameters_of, training_episodes
 from hyuav.comparison.shards import Shard
 from hyuav.comparison.statistics import (
     LAYOUTS,
@@ -25,6 +25,7 @@ from hyuav.durable import create_durably, write_durably
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EvaluationParameters
 from hyuav.learning.algorithms import ALGORITHMS
+from hyuav.learning.algorithms.registry import PEER
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import read_yaml
 from hyuav.runs import RunConfiguration, require_writable

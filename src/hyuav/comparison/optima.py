@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pandas as pd
 import torch
-from pyarrow.lib import ArrowException
 
 from hyuav.durable import write_durably
-from hyuav.errors import InputError, one_line
+from hyuav.errors import InputError
 from hyuav.evaluation import OPTIMA, Policy
+from hyuav.files import read_parquet
 from hyuav.scenario import Scenario
 from hyuav.schemes.optimum import FlightPolicy, solve_horizons
 
@@ -74,8 +74,4 @@ class Optima:
 
     def _flights(self) -> pd.DataFrame:
         columns = ["scheme", "num_slots", "value", "standard_error", "slot", "x", "y"]
-        try:
-            return pd.read_parquet(self.file)[columns]
-        except (OSError, LookupError, ValueError, ArrowException) as error:
-            reason = one_line(str(error))
-            raise InputError(f"{self.file}: expected best flights in Parquet ({reason})") from None
+        return read_parquet(self.file, "best flights", columns)

@@ -11,6 +11,7 @@ from hyuav.errors import InputError, rejection
 from hyuav.evaluation import EvaluationParameters
 from hyuav.layouts import random_layout
 from hyuav.learning.algorithms import ALGORITHMS, DDPG, AlgorithmParameters
+from hyuav.learning.algorithms.registry import PEER
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.parameters import (
@@ -27,9 +28,6 @@ from hyuav.parameters import (
 from hyuav.recording import cores
 from hyuav.scenario import PRESETS, Scenario
 from hyuav.system import SCHEMES
-
-PEER = "stable_baselines3"
-"""Stable-Baselines3's DDPG, which learns from the Gymnasium environment."""
 
 ENTRIES = (*ALGORITHMS, PEER)
 """What can be compared."""

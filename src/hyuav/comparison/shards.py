@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from pyarrow.lib import ArrowException
 from rich.console import Console
 
 from hyuav.comparison.optima import Optima
-from hyuav.comparison.plan import PEER, training_episodes
+from hyuav.comparison.plan import training_episodes
 from hyuav.durable import rename_durably, write_durably
 from hyuav.errors import BusyError, Halted, InputError, rejection
 from hyuav.evaluation import OPTIMA, EvaluationParameters, fly
 from hyuav.experiment import LEARNED, learned_policies, resume, train
+from hyuav.files import read_parquet
+from hyuav.learning.algorithms.registry import PEER
 from hyuav.runs import METRIC_NUMBERS, RunConfiguration, RunDirectory
 from hyuav.tracking import LoggerParameters, in_group
 
@@ -70,8 +71,8 @@ class Shard:
     def kept(self) -> tuple[pd.DataFrame, pd.DataFrame] | None:
         """Both tables, as :func:`tables` gave them; None where one is missing or damaged."""
         try:
-            results, curves = (pd.read_parquet(self.path / name) for name in TABLES)
-        except (OSError, ValueError, ArrowException):
+            results, curves = (read_parquet(self.path / name, "a table") for name in TABLES)
+        except InputError:
             return None
         learners = len(self.configuration.learners)
         whole = len(results) == learners and set(results) >= _RESULTS and set(curves) >= _CURVES

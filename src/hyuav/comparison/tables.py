@@ -9,9 +9,9 @@ from rich.console import Console
 from rich.table import Table
 
 from hyuav.comparison.directory import Summary
-from hyuav.comparison.plan import PEER
 from hyuav.comparison.statistics import NEAR_OPTIMAL
 from hyuav.errors import harmless
+from hyuav.learning.algorithms.registry import PEER
 from hyuav.metrics import finite_numbers
 from hyuav.terminal import print_line, print_table, results_table
 

@@ -12,6 +12,7 @@ from hyuav.dashboard.index import RunIndex, Stamp
 from hyuav.dashboard.plain import plain, refusals
 from hyuav.errors import InputError, rejection
 from hyuav.evaluation import FLIGHTS_FILE
+from hyuav.files import read_parquet
 from hyuav.report.player import flight_player
 from hyuav.report.style import scheme_label
 from hyuav.scenario import Scenario
@@ -101,15 +102,9 @@ def read_flights(path: Path, stamp: Stamp) -> pd.DataFrame:  # noqa: ARG001 - re
         InputError: it is damaged or another program's.
     """
     accepted = "the flights of an evaluation"
-    try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError(rejection("flights", str(path), f"{accepted}, in a smaller file"))
-        flights = pd.read_parquet(path)
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        if isinstance(error, InputError):
-            raise
-        accepted += " (the file is damaged)"
-        raise InputError(rejection("flights", str(path), accepted)) from None
+    if path.is_file() and path.stat().st_size > _LARGEST_FILE:
+        raise InputError(rejection("flights", str(path), f"{accepted}, in a smaller file"))
+    flights = read_parquet(path, accepted)
     missing = COLUMNS - set(flights.columns)
     if missing or flights.empty:
         accepted += f" with {', '.join(sorted(missing)) or 'rows'}"

@@ -31,7 +31,7 @@ from hyuav.figures.over_time import (
     offloading_table,
 )
 from hyuav.figures.style import COMPARED, save_figure, save_tables
-from hyuav.report.reading import readable_evaluation, readable_flights
+from hyuav.report.reading import is_drawable, readable_evaluation, readable_flights
 from hyuav.runs import RunDirectory, readable_metrics
 from hyuav.scenario import Scenario
 from hyuav.terminal import make_progress, print_line
@@ -61,7 +61,7 @@ class Finished:
         """A few flights of each scheme, a row per slot.
 
         Raises:
-            InputError: no scheme was evaluated, or the file is damaged.
+            InputError: no scheme was evaluated, the file is damaged, or another scenario's.
         """
         file = self._existing(FLIGHTS_FILE)
         flights = readable_flights(self.run.path)
@@ -69,6 +69,8 @@ class Finished:
             raise InputError(
                 f"{file}: expected flights in Parquet (recipes/evaluate.py makes them)"
             )
+        if not is_drawable(flights, self.scenario.num_ues):
+            raise InputError(f"{file}: expected flights over {self.scenario.num_ues} UEs")
         return flights
 
     @cached_property

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from pyarrow.lib import ArrowException
 
 from hyuav.errors import InputError
-from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE
+from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE, LABELS
+from hyuav.files import read_parquet
 from hyuav.parameters import read_yaml
 
 _PER_UE = {"offloading", "secrecy_rate", "ue_energy"}
@@ -47,6 +47,8 @@ def readable_evaluation(directory: Path) -> dict[str, Any] | None:
 
 
 def _is_account(account: dict[str, Any]) -> bool:
+    if type(account["learners"]) is not int:
+        return False
     rate = account["secrecy_sum_rate"]
     low, high = rate["ci95"]
     needed = [rate["mean"], low, high, *(account[name] for name in _ACCOUNT)]
@@ -74,12 +76,18 @@ def _is_flown(table: pd.DataFrame) -> bool:
     return all(own.ndim == 1 and np.isfinite(own).all() for own in drawn)
 
 
+def is_drawable(flights: pd.DataFrame, num_ues: int) -> bool:
+    """Whether flights are of known schemes, some at least, and tell of so many UEs."""
+    known = [isinstance(scheme, str) and scheme in LABELS for scheme in flights["scheme"]]
+    return any(known) and all(len(own) == num_ues for name in _PER_UE for own in flights[name])
+
+
 def readable_table(path: Path, columns: Iterable[str]) -> pd.DataFrame | None:
     """A Parquet file with at least these columns; None where it is none, yet, or has no rows."""
     if not path.is_file():
         return None
     try:
-        table = pd.read_parquet(path)
-    except (OSError, ValueError, ArrowException):
+        table = read_parquet(path, "a table")
+    except InputError:
         return None
     return table if len(table) and set(columns) <= set(table.columns) else None

@@ -58,8 +58,11 @@ def test_registering_again_replaces_ones_own() -> None:
     assert ALGORITHMS["bold"] is Bold
 
 
-@pytest.mark.parametrize("name", ["ddpg", "Bold", "bold-er", "", "../bold", "bold_robust", "b\n"])
-def test_names_that_are_taken_or_are_no_names_are_refused(name: str) -> None:
+@pytest.mark.parametrize(
+    "name",
+    ["ddpg", "Bold", "bold-er", "", "../bold", "bold_robust", "b\n", "stable_baselines3", 3, None],
+)
+def test_names_that_are_taken_or_are_no_names_are_refused(name: Any) -> None:
     with pytest.raises(InputError, match=r"algorithm = .*: expected .*not taken"):
         register(name, Bold)
     assert ALGORITHMS["ddpg"] is DDPG

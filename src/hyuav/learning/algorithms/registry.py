@@ -29,6 +29,9 @@ ALGORITHMS: dict[str, type[AlgorithmParameters]] = {
 
 BUILT_IN = tuple(ALGORITHMS)
 
+PEER = "stable_baselines3"
+"""In a comparison, that library's DDPG; no algorithm may have its name."""
+
 
 def register(name: str, algorithm: type[AlgorithmParameters]) -> None:
     """Let a name choose an algorithm, on the command line and in a run's configuration.
@@ -48,8 +51,9 @@ def register(name: str, algorithm: type[AlgorithmParameters]) -> None:
     Example:
         >>> register("ddpg_relu", ReluDDPG)
     """
-    taken = name in BUILT_IN or name.endswith("_robust")  # which stands for variants of a plain one
-    if taken or not re.fullmatch(r"[a-z][a-z0-9_]*", name):
+    written = isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9_]*", name)
+    # ..._robust stands for variants of a plain one
+    if not written or name in (*BUILT_IN, PEER) or name.endswith("_robust"):
         accepted = "lower-case letters, digits and underscores, and a name that is not taken"
         raise InputError(rejection("algorithm", name, accepted))
     try:
