@@ -75,6 +75,12 @@ def test_a_checkpoint_flies_only_with_as_many_ues_as_it_knows(trained: Path) -> 
         flown(fewer, "hybrid", checkpoint)
 
 
+def test_a_checkpoint_alone_flies_no_longer_than_one_waits(trained: Path) -> None:
+    longer = dataclasses.replace(SCENARIO, num_slots=501)
+    with pytest.raises(InputError, match="num_slots = 501: expected a whole number <= 500"):
+        flown_by(longer, "hybrid", checkpoint_of(RunIndex(trained), "tiny", 0))
+
+
 def test_a_foreign_checkpoint_is_refused_and_a_mended_one_taken(runs: Path) -> None:
     index, file = RunIndex(runs), runs / "tiny" / "checkpoints" / "best.pt"
     kept = file.read_bytes()

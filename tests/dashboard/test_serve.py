@@ -49,6 +49,7 @@ def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
         ("runs=file", "runs = 'file': expected a directory"),
         ("address=192.0.2.1", "address = '192.0.2.1:8501': expected an address and a port"),
         ("address=nowhere.invalid", "expected an address and a port of this machine"),
+        ("address=a..b", "address = 'a..b:8501': expected an address and a port"),
         ("port=70000", "expected an address and a port of this machine"),
         ("port=0", "port = 0: expected a whole number >= 1"),
         ("prt=3", "configuration: unknown field 'prt': did you mean 'port'"),

@@ -66,11 +66,7 @@ def resolution(scenario: Scenario, *, fine: bool) -> float:
     Raises:
         InputError: the helper is too slow, or the scenario too large, to be solved meanwhile.
     """
-    accepted = "a whole number <= {} to be flown on this page"
-    if scenario.num_slots > MOST_SLOTS:
-        raise InputError(rejection("num_slots", scenario.num_slots, accepted.format(MOST_SLOTS)))
-    if scenario.num_ues > MOST_UES:
-        raise InputError(rejection("number of UEs", scenario.num_ues, accepted.format(MOST_UES)))
+    _require_size(scenario)
     way = scenario.max_speed * scenario.slot_duration
     if way * _MOST_SPACINGS < scenario.map_side:
         least = scenario.map_side / (_MOST_SPACINGS * scenario.slot_duration)
@@ -125,7 +121,17 @@ def flown_by(scenario: Scenario, rule: str, checkpoint: Checkpoint) -> Evaluatio
     return evaluate(scenario, "own", {LEARNED[rule]: [_policy(scenario, checkpoint)]}, EPISODES)
 
 
+def _require_size(scenario: Scenario) -> None:
+    """Accept only what is flown while somebody waits."""
+    accepted = "a whole number <= {} to be flown on this page"
+    if scenario.num_slots > MOST_SLOTS:
+        raise InputError(rejection("num_slots", scenario.num_slots, accepted.format(MOST_SLOTS)))
+    if scenario.num_ues > MOST_UES:
+        raise InputError(rejection("number of UEs", scenario.num_ues, accepted.format(MOST_UES)))
+
+
 def _policy(scenario: Scenario, checkpoint: Checkpoint) -> Policy:
+    _require_size(scenario)
     configuration, weights = _saved(checkpoint.run, checkpoint.stamp)
     trained = configuration.scenario.num_ues
     if scenario.num_ues != trained:

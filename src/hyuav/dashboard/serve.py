@@ -2,6 +2,7 @@
 
 import importlib.util
 import ipaddress
+import os
 import socket
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,9 @@ def serve(options: Dashboard) -> None:
     _require_free(options.address, options.port)
     from streamlit.web import cli
 
-    cli.main(["run", *_flags(options), str(APP), "--", str(runs.resolve())], standalone_mode=False)
+    cli.main(
+        ["run", *_flags(options), str(APP), "--", os.path.realpath(runs)], standalone_mode=False
+    )
 
 
 def _require_free(address: str, port: int) -> None:
@@ -54,7 +57,7 @@ def _require_free(address: str, port: int) -> None:
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind((address, port))
-    except (OSError, OverflowError) as error:
+    except (OSError, ValueError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         accepted = f"an address and a port of this machine that are free ({reason})"
         raise InputError(rejection("address", f"{address}:{port}", accepted)) from None
