@@ -122,13 +122,15 @@ def test_a_training_that_is_killed_while_it_is_loading_ends_so_too(tmp_path: Pat
 @pytest.mark.slow
 def test_a_training_that_is_killed_again_and_again_ends_so_too(tmp_path: Path) -> None:
     configuration, started = small("never"), time.monotonic()
-    run_to_the_end(tmp_path / "unbroken", configuration)
-    lifetime = time.monotonic() - started  # with the loading, which each of them begins with
-    luck, killed = random.Random(1), 0
-    while kill_after(luck.uniform(0.5, 0.9) * lifetime, tmp_path / "killed", configuration):
+    lifetime = run_to_the_end(tmp_path / "unbroken", configuration)
+    whole = time.monotonic() - started  # with the loading, with which those begin that go on
+    directory, moment = tmp_path / "killed", 0.5 * lifetime
+    while not kill_after(moment, directory, configuration):
+        moment, directory = 0.6 * moment, directory.with_name(f"{directory.name}-again")
+    luck, killed = random.Random(1), 1
+    while kill_after(luck.uniform(0.5, 0.9) * whole, directory, configuration):
         killed += 1
-    assert killed > 0
-    assert differences(outcome(tmp_path / "killed"), outcome(tmp_path / "unbroken")) == []
+    assert differences(outcome(directory), outcome(tmp_path / "unbroken")) == []
     write_figures("kills_one_after_another", {"kills": killed})
 
 
