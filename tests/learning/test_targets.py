@@ -6,6 +6,7 @@ from tensordict import TensorDictBase
 
 from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithms import DDPG
+from hyuav.learning.targets import raise_target
 
 WORTH = 3.0
 
@@ -13,10 +14,9 @@ WORTH = 3.0
 def target(batch: TensorDictBase, worth: float | None) -> torch.Tensor:
     """What the critics are to predict (2, K) where acting otherwise is worth so much everywhere."""
     torch.manual_seed(0)
-    parameters = DDPG(hidden_sizes=(8,), discount=0.9)
-    loss = parameters.build(2, TEN_UES).loss
+    loss = DDPG(hidden_sizes=(8,), discount=0.9).build(2, TEN_UES).loss
     if worth is not None:
-        parameters.estimate_values(loss, lambda observed: torch.full_like(observed[..., :1], worth))
+        raise_target(loss, 0.9, lambda observed: torch.full_like(observed[..., :1], worth))
     batch = batch.clone()
     batch["next", "state_action_value"] = torch.randn(2, 5, 1)
     return torch.as_tensor(loss.value_estimator.value_estimate(batch)).squeeze(-1)

@@ -5,6 +5,7 @@ from typing import Any
 
 from tensordict import TensorDictBase
 from torch import Tensor
+from torchrl.objectives import LossModule
 from torchrl.objectives.value import TD0Estimator
 
 
@@ -31,3 +32,17 @@ class RaisedTD0(TD0Estimator):
         counted = self.gamma * (1.0 - following["terminated"].to(target.dtype))
         otherwise = self._alternative(following["observation"])
         return target.maximum(following["reward"] + counted * otherwise)
+
+
+def raise_target(loss: LossModule, gamma: float, alternative: Callable[[Tensor], Tensor]) -> None:
+    """Let a loss count what acting otherwise is worth.
+
+    Args:
+        loss: whose target is TorchRL's TD(0).
+        gamma: the discount.
+        alternative: see :class:`RaisedTD0`.
+    """
+    plain = loss.value_estimator
+    raised = RaisedTD0(alternative=alternative, gamma=gamma, value_network=plain.value_network)
+    raised.set_keys(value=plain.tensor_keys.value)
+    loss.make_value_estimator(raised)

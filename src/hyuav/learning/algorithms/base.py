@@ -17,13 +17,14 @@ from torch import Tensor, nn
 from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 
 from hyuav.learning.afterstate import Afterstate
+from hyuav.learning.alternatives import Alternatives
 from hyuav.learning.control_variate import ControlVariate
 from hyuav.learning.expectation import Expectation
 from hyuav.learning.exploration import WarmUp
 from hyuav.learning.networks import ACTIVATIONS, make_critic
 from hyuav.learning.repetition import BestFlights
 from hyuav.learning.replay import Memory
-from hyuav.learning.targets import RaisedTD0
+from hyuav.learning.targets import raise_target
 from hyuav.parameters import Parameters, choice, count, number, parameter, sequence, switch
 from hyuav.scenario import Scenario
 
@@ -68,6 +69,11 @@ class AlgorithmParameters(Parameters, ABC):
     """After each episode from the end of the warm-up on, where flights are kept and there is a
     control variate: how many straight flights are judged, and as many variations of the best; see
     :class:`hyuav.learning.imagination.Imagination`."""
+
+    alternatives_weight: float = parameter(number(0.0, 1e6), 0.0)
+    """How strongly the actor is drawn to the better of :class:`~hyuav.learning.alternatives.\
+Alternatives` where that is worth more than what it does; with any weight, the critics' target
+    counts whichever is worth more."""
 
     @abstractmethod
     def build(self, learners: int, scenario: Scenario) -> "Algorithm":
@@ -123,32 +129,39 @@ class AlgorithmParameters(Parameters, ABC):
     @property
     def keeps_flights(self) -> bool:
         """Whether best flights are of use."""
-        return self.repeat_every > 0
+        return self.repeat_every > 0 or self.alternatives_weight > 0
 
     @property
     def memory(self) -> Memory:
         """What is kept of each slot."""
         return Memory(self.reward_scale, self.finite_horizon, fading=self.control_variate)
 
-    def estimate_values(
-        self, loss: LossModule, alternative: Callable[[Tensor], Tensor] | None = None
-    ) -> None:
-        """Give a loss its target.
+    def weigh(
+        self,
+        loss: LossModule,
+        critic: str,
+        act: Callable[[TensorDictBase], Tensor],
+        flights: BestFlights,
+    ) -> Callable[[TensorDictBase], Tensor | float]:
+        """Give a loss its target, and say what is to be added to the actor's loss.
 
         Args:
             loss: of N learners.
-            alternative: see :class:`hyuav.learning.targets.RaisedTD0`.
+            critic: what the loss calls its critics.
+            act: maps a mini-batch (N, K) to the actors' noise-free actions.
+            flights: the best so far.
+
+        Returns:
+            :meth:`hyuav.learning.alternatives.Alternatives.missed`, or 0 where alternatives are
+            not weighed.
         """
         loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
-        if alternative is not None:
-            plain = loss.value_estimator
-            raised = RaisedTD0(
-                alternative=alternative,
-                gamma=self.discount,
-                value_network=plain.value_network,
-            )
-            raised.set_keys(value=plain.tensor_keys.value)
-            loss.make_value_estimator(raised)
+        if not self.alternatives_weight:
+            return lambda _: 0.0
+        weight = self.alternatives_weight
+        alternatives = Alternatives(loss, critic, act, flights, weight, clock=self.clock)
+        raise_target(loss, self.discount, alternatives.worth)
+        return alternatives.missed
 
     @property
     def explorer_normals(self) -> int:

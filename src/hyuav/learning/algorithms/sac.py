@@ -21,6 +21,7 @@ from hyuav.learning.algorithms.base import (
     learning_rate,
 )
 from hyuav.learning.networks import LearnerMLP
+from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import number, parameter
 from hyuav.scenario import Scenario
 
@@ -54,6 +55,13 @@ class LearnerSACLoss(SACLoss):
         """Both losses (N, K) from one sample of actions; neither's gradient reaches the other."""
         actor_loss, metadata = self.actor_loss(batch)
         return actor_loss + self._alpha_loss(metadata["log_prob"])
+
+    def mean_action(self, batch: TensorDictBase) -> Tensor:
+        """The actors' noise-free actions (N, K, 2) of a mini-batch, with gradients."""
+        observed = batch.select(*self.actor_network.in_keys)
+        with self.actor_network_params.to_module(self.actor_network, preserve_module_state=False):
+            action: Tensor = self.actor_network.get_dist(observed).deterministic_sample
+        return action
 
 
 @dataclass(frozen=True)
@@ -92,7 +100,8 @@ class SAC(AlgorithmParameters):
             reduction="none",
             scalar_output_mode="exclude",
         )
-        self.estimate_values(loss)
+        flights = BestFlights(learners, scenario)
+        missed = self.weigh(loss, "qvalue_network", loss.mean_action, flights)
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         actor_optimizer.add_param_group(
@@ -104,6 +113,7 @@ class SAC(AlgorithmParameters):
             actor=TensorDictSequential(distribution, mean),
             explorer=explorer,
             loss=loss,
+            best_flights=flights if self.keeps_flights else None,
             steps=(
                 GradientStep(
                     "critic",
@@ -111,7 +121,12 @@ class SAC(AlgorithmParameters):
                     critic_optimizer,
                     normals=1,
                 ),
-                GradientStep("actor", loss.actor_and_temperature_loss, actor_optimizer, normals=1),
+                GradientStep(
+                    "actor",
+                    lambda batch: loss.actor_and_temperature_loss(batch) + missed(batch),
+                    actor_optimizer,
+                    normals=1,
+                ),
             ),
             target=SoftUpdate(loss, tau=self.target_rate),
         )

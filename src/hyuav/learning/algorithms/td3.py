@@ -1,13 +1,12 @@
 """TD3: DDPG with twin critics, smoothed targets and a slower actor (Fujimoto et al., ICML 2018)."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from tensordict.nn import TensorDictSequential
 from torchrl.objectives import SoftUpdate, TD3Loss
 
 from hyuav.learning.algorithms.base import Algorithm, GradientStep, adam
-from hyuav.learning.algorithms.ddpg import DDPG
+from hyuav.learning.algorithms.ddpg import DDPG, act
 from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import count, number, parameter
 from hyuav.scenario import Scenario
@@ -20,8 +19,6 @@ class TD3(DDPG):
     target_noise_std: float = parameter(number(0.0, 2.0), 0.2)
     target_noise_clip: float = parameter(number(0.0, 2.0), 0.5)
     actor_every: int = parameter(count(), 2)
-
-    critic_name: ClassVar[str] = "qvalue_network"
 
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
@@ -38,7 +35,7 @@ class TD3(DDPG):
             reduction="none",
         )
         flights = BestFlights(learners, scenario)
-        self.estimate_values(loss, self.best_alternative(loss, flights))
+        missed = self.weigh(loss, "qvalue_network", lambda batch: act(loss, batch), flights)
         critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
         actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
         return Algorithm(
@@ -56,7 +53,7 @@ class TD3(DDPG):
                 ),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.actor_loss(batch)[0] + self.missed(loss, flights, batch),
+                    lambda batch: loss.actor_loss(batch)[0] + missed(batch),
                     actor_optimizer,
                     every=self.actor_every,
                 ),
