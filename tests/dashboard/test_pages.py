@@ -212,7 +212,7 @@ def test_an_evaluation_that_is_kept_apart_is_played(runs: Path) -> None:
 def test_damaged_flights_are_refused_in_a_line(runs: Path, content: bytes) -> None:
     (runs / "tiny" / "flights.parquet").write_bytes(content)
     (line,) = errors(opened(_flights, runs))
-    assert "expected the flights of an evaluation (the file is damaged)" in line
+    assert "flights.parquet: expected the flights of an evaluation in Parquet (" in line
 
 
 def test_a_changed_parameter_changes_the_optimum_at_once(tmp_path: Path) -> None:
