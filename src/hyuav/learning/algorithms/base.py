@@ -136,6 +136,10 @@ Alternatives` where that is worth more than what it does; with any weight, the c
         """What is kept of each slot."""
         return Memory(self.reward_scale, self.finite_horizon, fading=self.control_variate)
 
+    def estimate_values(self, loss: LossModule) -> None:
+        """Give a loss the target of eq. 9, with the discount."""
+        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
+
     def weigh(
         self,
         loss: LossModule,
@@ -155,7 +159,7 @@ Alternatives` where that is worth more than what it does; with any weight, the c
             :meth:`hyuav.learning.alternatives.Alternatives.missed`, or 0 where alternatives are
             not weighed.
         """
-        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
+        self.estimate_values(loss)
         if not self.alternatives_weight:
             return lambda _: 0.0
         weight = self.alternatives_weight
