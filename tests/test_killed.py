@@ -52,6 +52,13 @@ def kill_after(seconds: float, directory: Path, configuration: RunConfiguration)
     return running.exitcode != 0
 
 
+def killed_after(seconds: float, directory: Path, configuration: RunConfiguration) -> Path:
+    """The directory of one that was killed then, or earlier where it had ended by then."""
+    while not kill_after(seconds, directory, configuration):
+        seconds, directory = 0.6 * seconds, directory.with_name(f"{directory.name}-again")
+    return directory
+
+
 def write_figures(name: str, figures: Mapping[str, Any]) -> None:
     """Keep what docs/reliability.md tells."""
     MEASURED.mkdir(parents=True, exist_ok=True)
@@ -83,10 +90,8 @@ def test_a_killed_training_ends_with_the_numbers_of_an_unbroken_one(
     expected = outcome(tmp_path / "unbroken")
     luck, stages, torn = random.Random(0), Counter[str](), 0
     for number in range(kills):
-        directory = tmp_path / f"killed-{number}"
         moment = (number + luck.random()) / kills * lifetime
-        while not kill_after(moment, directory, configuration):
-            moment, directory = 0.6 * moment, directory.with_name(f"{directory.name}-again")
+        directory = killed_after(moment, tmp_path / f"killed-{number}", configuration)
         stages[stage(directory)] += 1
         torn += any(directory.rglob("*.partial"))
         run_to_the_end(directory, configuration)
@@ -124,9 +129,7 @@ def test_a_training_that_is_killed_again_and_again_ends_so_too(tmp_path: Path) -
     configuration, started = small("never"), time.monotonic()
     lifetime = run_to_the_end(tmp_path / "unbroken", configuration)
     whole = time.monotonic() - started  # with the loading, with which those begin that go on
-    directory, moment = tmp_path / "killed", 0.5 * lifetime
-    while not kill_after(moment, directory, configuration):
-        moment, directory = 0.6 * moment, directory.with_name(f"{directory.name}-again")
+    directory = killed_after(0.5 * lifetime, tmp_path / "killed", configuration)
     luck, killed = random.Random(1), 1
     while kill_after(luck.uniform(0.5, 0.9) * whole, directory, configuration):
         killed += 1

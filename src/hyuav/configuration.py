@@ -201,10 +201,11 @@ def _refuse_overrides(node: Mapping[str, Any], groups: Iterable[str]) -> None:
         if once and argument in ("-m", "--multirun"):
             raise InputError(f"{argument}: this recipe does a single job: leave it out")
         name, _, value = argument.partition("=")
-        if name.lstrip("+~") in groups and (name.startswith("~") or value.startswith("[")):
-            offered = sorted(each.removesuffix(".yaml") for each in repository[name.lstrip("+~")])
+        entry = name.lstrip("+~")
+        if entry in groups and (name.startswith("~") or value.startswith("[")):
+            offered = sorted(member.removesuffix(".yaml") for member in repository[entry])
             require_choice(name, value, offered)
-        path = name.lstrip("+~").split(".")
+        path = entry.split(".")
         below: Any = known
         for depth, key in enumerate(path):
             if not isinstance(below, Mapping):

@@ -71,9 +71,9 @@ class AlgorithmParameters(Parameters, ABC):
     :class:`hyuav.learning.imagination.Imagination`."""
 
     alternatives_weight: float = parameter(number(0.0, 1e6), 0.0)
-    """How strongly the actor is drawn to the better of :class:`~hyuav.learning.alternatives.\
-Alternatives` where that is worth more than what it does; with any weight, the critics' target
-    counts whichever is worth more."""
+    """How strongly the actor is drawn to an alternative that is worth more than what it does; with
+    any weight, the critics' target counts whichever is worth more. See
+    :class:`hyuav.learning.alternatives.Alternatives`."""
 
     @abstractmethod
     def build(self, learners: int, scenario: Scenario) -> "Algorithm":
