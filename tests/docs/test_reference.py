@@ -68,7 +68,7 @@ def test_what_is_accepted_is_what_the_check_says() -> None:
 
 def test_what_the_source_says_of_a_field_is_found_in_base_classes_too() -> None:
     assert descriptions(TrainingParameters)["cohorts"].startswith("Groups of learners")
-    assert descriptions(RobustDDPG)["finite_horizon"].startswith("The last slot ends the return")
+    assert descriptions(RobustDDPG)["clock"].startswith("Observe the slots flown.")
 
 
 def test_every_public_module_is_on_one_page_of_the_api_reference() -> None:

@@ -90,7 +90,6 @@ def test_the_defaults_are_the_papers() -> None:
         # What the paper does not have:
         "clock": False,
         "geofence": False,
-        "finite_horizon": False,
         "reward_scale": 1.0,
         "layer_norm": False,
         "warm_up_episodes": 0,

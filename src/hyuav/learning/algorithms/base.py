@@ -46,11 +46,10 @@ class AlgorithmParameters(Parameters, ABC):
     discount: float = parameter(number(0.0, 1.0), 0.95, symbol="gamma")
     target_rate: float = parameter(number(0.0, 1.0), 0.005, symbol="tau")
     clock: bool = parameter(switch, False)
-    """Observe the slots flown."""
+    """Observe the slots flown. The last slot then ends the return: what is observed after it is
+    never the beginning of a slot, so that a value there would not be learned."""
     geofence: bool = parameter(switch, False)
     """Slow flights so that they end on the map."""
-    finite_horizon: bool = parameter(switch, False)
-    """The last slot ends the return: no value is expected beyond it."""
     reward_scale: float = parameter(number(above=0.0), 1.0)
     layer_norm: bool = parameter(switch, False)
     """In the critics."""
@@ -134,7 +133,7 @@ class AlgorithmParameters(Parameters, ABC):
     @property
     def memory(self) -> Memory:
         """What is kept of each slot."""
-        return Memory(self.reward_scale, self.finite_horizon, fading=self.control_variate)
+        return Memory(self.reward_scale, finite_horizon=self.clock, fading=self.control_variate)
 
     def estimate_values(self, loss: LossModule) -> None:
         """Give a loss the target of eq. 9, with the discount."""

@@ -21,7 +21,6 @@ class Robust(AlgorithmParameters):
     target_rate: float = parameter(number(0.0, 1.0), 0.01, symbol="tau")
     clock: bool = parameter(switch, True)
     geofence: bool = parameter(switch, True)
-    finite_horizon: bool = parameter(switch, True)
     reward_scale: float = parameter(number(above=0.0), 0.05)
     layer_norm: bool = parameter(switch, True)
     afterstate: bool = parameter(switch, True)
