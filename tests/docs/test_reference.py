@@ -53,9 +53,9 @@ def test_a_row_gives_default_check_unit_symbol_and_meaning() -> None:
     shown = ["`max_speed`", "`20`", "a number in [1e-09, 1e+09]", "m/s", r"$v_{\mathrm{max}}$"]
     assert by_name["`max_speed`"] == shown
     assert by_name["`ue_positions`"][1] == "required"
-    clock = {row[0]: row for row in rows(table(DDPG))}["`clock`"]
-    assert clock[1:3] == ["`false`", "true or false"]
-    assert clock[-1] == "Observe the slots flown."
+    geofence = {row[0]: row for row in rows(table(DDPG))}["`geofence`"]
+    assert geofence[1:3] == ["`false`", "true or false"]
+    assert geofence[-1] == "Slow flights so that they end on the map."
 
 
 def test_what_is_accepted_is_what_the_check_says() -> None:
