@@ -44,6 +44,19 @@ def test_with_one_learner_the_losses_are_torchrls() -> None:
     torch.testing.assert_close(mine, expected)
 
 
+def test_a_stretch_brings_the_noise_free_action_to_full_speed() -> None:
+    plain, stretched = (
+        SAC(hidden_sizes=(8,), action_stretch=stretch).build(2, TEN_UES) for stretch in (1.0, 1.5)
+    )
+    stretched.loss.load_state_dict(plain.loss.state_dict())
+    data = TensorDict(observation=3.0 * torch.randn(2, 40, 15), batch_size=[2, 40])
+    action = plain.actor(data.clone())["action"]
+    expected = (1.5 * action).clamp(-1.0, 1.0)
+    assert expected.abs().max() == 1.0
+    torch.testing.assert_close(stretched.actor(data.clone())["action"], expected)
+    torch.testing.assert_close(stretched.loss.mean_action(data), expected)
+
+
 def test_the_noise_free_action_is_the_mode_of_the_explored_ones() -> None:
     algorithm = SAC(hidden_sizes=(8,)).build(2, TEN_UES)
     data = TensorDict(observation=torch.randn(2, 9, 15), batch_size=[2, 9])

@@ -69,6 +69,8 @@ class AlgorithmParameters(Parameters, ABC):
     control variate: how many straight flights are judged, and as many variations of the best; see
     :class:`hyuav.learning.imagination.Imagination`."""
 
+    action_stretch: float = parameter(number(1.0, 2.0), 1.0)
+    """Of the tanh that ends the actor; see :class:`hyuav.learning.networks.StretchedTanh`."""
     alternatives_weight: float = parameter(number(0.0, 1e6), 0.0)
     """How strongly the actor is drawn to an alternative that is worth more than what it does; with
     any weight, the critics' target counts whichever is worth more. See

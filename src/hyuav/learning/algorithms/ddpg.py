@@ -29,8 +29,6 @@ class DDPG(AlgorithmParameters):
     noise_variance: float = parameter(number(0.0, 1e6), 0.6)
     noise_decay: float = parameter(number(0.0, 1.0), 0.999)
     noise_decay_per: str = parameter(choice("slot", "episode"), "slot")
-    action_stretch: float = parameter(number(1.0, 2.0), 1.0)
-    """Of the actor's tanh; see :class:`hyuav.learning.networks.StretchedTanh`."""
 
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""

@@ -28,6 +28,7 @@ class Robust(AlgorithmParameters):
     repeat_every: int = parameter(count(0), 4)
     control_variate: bool = parameter(switch, True)
     imagined_flights: int = parameter(count(0, 100_000), 64)
+    action_stretch: float = parameter(number(1.0, 2.0), 1.04)
     alternatives_weight: float = parameter(number(0.0, 1e6), 0.1)
 
 
@@ -38,7 +39,6 @@ class RobustDDPG(Robust, DDPG):
     noise_variance: float = parameter(number(0.0, 1e6), 0.16)
     noise_decay: float = parameter(number(0.0, 1.0), 0.985)
     noise_decay_per: str = parameter(choice("slot", "episode"), "episode")
-    action_stretch: float = parameter(number(1.0, 2.0), 1.04)
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class RobustTD3(RobustDDPG, TD3):
 
 @dataclass(frozen=True)
 class RobustSAC(Robust, SAC):
-    """SAC with all but the stretch, which its actor does not need."""
+    """SAC with the same pieces; its noise-free actor is stretched, what it explores with is not."""
 
     temperature_init: float = parameter(number(1e-6, 1e6), 0.01)
     target_entropy: float = parameter(number(-100.0, 100.0), -4.0)

@@ -20,7 +20,7 @@ from hyuav.learning.algorithms.base import (
     adam,
     learning_rate,
 )
-from hyuav.learning.networks import LearnerMLP
+from hyuav.learning.networks import LearnerMLP, StretchedTanh
 from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import number, parameter
 from hyuav.scenario import Scenario
@@ -29,8 +29,11 @@ from hyuav.scenario import Scenario
 class LearnerSACLoss(SACLoss):
     """TorchRL's SAC loss with a temperature of its own for each learner."""
 
-    def __init__(self, *networks: Any, learners: int, alpha_init: float, **options: Any) -> None:
+    def __init__(
+        self, *networks: Any, learners: int, alpha_init: float, stretch: float, **options: Any
+    ) -> None:
         super().__init__(*networks, alpha_init=alpha_init, **options)
+        self._stretch = stretch
         # (N, 1) broadcasts against the log-probabilities (N, K) of a mini-batch.
         self.log_alpha = nn.Parameter(torch.full((learners, 1), math.log(alpha_init)))
 
@@ -61,7 +64,7 @@ class LearnerSACLoss(SACLoss):
         observed = batch.select(*self.actor_network.in_keys)
         with self.actor_network_params.to_module(self.actor_network, preserve_module_state=False):
             action: Tensor = self.actor_network.get_dist(observed).deterministic_sample
-        return action
+        return (self._stretch * action).clamp(-1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,7 @@ class SAC(AlgorithmParameters):
             self.make_critic(learners, scenario),
             learners=learners,
             alpha_init=self.temperature_init,
+            stretch=self.action_stretch,
             num_qvalue_nets=2,
             target_entropy=self.target_entropy,
             loss_function="l2",
@@ -107,7 +111,9 @@ class SAC(AlgorithmParameters):
         actor_optimizer.add_param_group(
             {"params": [loss.log_alpha], "lr": self.temperature_learning_rate}
         )
-        mean = TensorDictModule(nn.Tanh(), in_keys=["loc"], out_keys=["action"])
+        mean = TensorDictModule(
+            StretchedTanh(self.action_stretch), in_keys=["loc"], out_keys=["action"]
+        )
         return Algorithm(
             parameters=self,
             actor=TensorDictSequential(distribution, mean),
