@@ -95,6 +95,11 @@ def _over_rows(layers: nn.Module, *inputs: Tensor) -> Tensor:
     return outputs.reshape(*joined.shape[:-1], outputs.shape[-1])
 
 
+def stretched(action: Tensor, stretch: float) -> Tensor:
+    """An action (...) times ``stretch``, cut off at -1 and 1."""
+    return (stretch * action).clamp(-1.0, 1.0)
+
+
 class StretchedTanh(nn.Module):
     """A tanh times ``stretch``, cut off at -1 and 1, which it so reaches where it is not yet flat.
 
@@ -108,7 +113,7 @@ class StretchedTanh(nn.Module):
 
     def forward(self, inputs: Tensor) -> Tensor:
         """Map (...) to [-1, 1] (...)."""
-        return (self.stretch * inputs.tanh()).clamp(-1.0, 1.0)
+        return stretched(inputs.tanh(), self.stretch)
 
 
 class AfterstateCritic(nn.Module):

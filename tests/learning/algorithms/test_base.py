@@ -1,5 +1,6 @@
 """What holds for every algorithm."""
 
+import dataclasses
 import warnings
 
 import pytest
@@ -9,6 +10,7 @@ from torch import Tensor
 
 from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithms import ALGORITHMS, Algorithm
+from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
 
 NAMES = sorted(ALGORITHMS)
@@ -82,3 +84,15 @@ def test_building_warns_of_nothing(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         build(name, 2)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("clock", [False, True])
+def test_the_last_slot_ends_the_return_where_the_slots_are_observed(name: str, clock: bool) -> None:
+    scenario = dataclasses.replace(TEN_UES, num_slots=4)
+    algorithm = ALGORITHMS[name](clock=clock, hidden_sizes=(8,))
+    trained = Cohort(scenario, [Learner("relay", 0)], algorithm, 16, 8, None)
+    for _ in range(2):
+        trained.fly()
+    ended = trained.replay[:]["next", "terminated"].flatten().tolist()
+    assert ended == 2 * [False, False, False, clock]

@@ -45,6 +45,7 @@ def test_with_one_learner_the_losses_are_torchrls() -> None:
 
 
 def test_a_stretch_brings_the_noise_free_action_to_full_speed() -> None:
+    torch.manual_seed(0)
     plain, stretched = (
         SAC(hidden_sizes=(8,), action_stretch=stretch).build(2, TEN_UES) for stretch in (1.0, 1.5)
     )

@@ -68,7 +68,6 @@ class AlgorithmParameters(Parameters, ABC):
     """After each episode from the end of the warm-up on, where flights are kept and there is a
     control variate: how many straight flights are judged, and as many variations of the best; see
     :class:`hyuav.learning.imagination.Imagination`."""
-
     action_stretch: float = parameter(number(1.0, 2.0), 1.0)
     """Of the tanh that ends the actor; see :class:`hyuav.learning.networks.StretchedTanh`."""
     alternatives_weight: float = parameter(number(0.0, 1e6), 0.0)

@@ -20,7 +20,7 @@ from hyuav.learning.algorithms.base import (
     adam,
     learning_rate,
 )
-from hyuav.learning.networks import LearnerMLP, StretchedTanh
+from hyuav.learning.networks import LearnerMLP, StretchedTanh, stretched
 from hyuav.learning.repetition import BestFlights
 from hyuav.parameters import number, parameter
 from hyuav.scenario import Scenario
@@ -64,7 +64,7 @@ class LearnerSACLoss(SACLoss):
         observed = batch.select(*self.actor_network.in_keys)
         with self.actor_network_params.to_module(self.actor_network, preserve_module_state=False):
             action: Tensor = self.actor_network.get_dist(observed).deterministic_sample
-        return (self._stretch * action).clamp(-1.0, 1.0)
+        return stretched(action, self._stretch)
 
 
 @dataclass(frozen=True)
