@@ -39,11 +39,12 @@ test: setup ## run the tests
 test-slow: setup ## run the checks that take minutes: learning, pages, distributions
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
-lint: setup ## check style, formatting, types, docstrings and dependencies
+lint: setup ## check style, formatting, types, docstrings, dependencies and imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/interrogate src
 	$(BIN)/deptry .
+	$(BIN)/lint-imports
 	$(BIN)/mypy
 
 format: setup ## format the code

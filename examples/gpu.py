@@ -10,7 +10,8 @@ import torch
 from torch import Tensor
 
 from hyuav import DDPG, Learner, RobustDDPG, Scenario, Training, TrainingParameters, make_env
-from hyuav.learning.algorithms import SAC, AlgorithmParameters
+from hyuav.learning.algorithm import AlgorithmParameters
+from hyuav.learning.sac import SAC
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
 SHORT = RobustDDPG(warm_up_episodes=5)

@@ -16,18 +16,18 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
-from hyuav.comparison.charts import draw
-from hyuav.comparison.directory import ComparisonDirectory
-from hyuav.comparison.plan import Compare, require_libraries
-from hyuav.comparison.tables import print_tables
-from hyuav.comparison.work import work_off
-from hyuav.configuration import Config, recipe, same_call, section, telling_how_to_go_on
-from hyuav.errors import harmless
-from hyuav.evaluation import EvaluationParameters
+from hyuav._support.errors import harmless
+from hyuav._support.terminal import print_line
+from hyuav.experiments.comparison.directory import ComparisonDirectory
+from hyuav.experiments.comparison.plan import Compare, require_libraries
+from hyuav.experiments.comparison.tables import print_tables
+from hyuav.experiments.comparison.work import work_off
+from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
+from hyuav.experiments.evaluation import EvaluationParameters
+from hyuav.experiments.tracking import LoggerParameters, log_comparison
 from hyuav.learning.training import TrainingParameters
-from hyuav.report.page import write_comparison_report
-from hyuav.terminal import print_line
-from hyuav.tracking import LoggerParameters, log_comparison
+from hyuav.viz.html.page import write_comparison_report
+from hyuav.viz.paper.comparison import draw
 
 
 @recipe(
@@ -62,7 +62,7 @@ def compare(config: Config, directory: Path) -> None:
         draw(summary, options, directory / "figures")
         logger = LoggerParameters.from_dict(config["logger"])
         report = write_comparison_report(directory)
-        log_comparison(directory, summary, config, logger, console)
+        log_comparison(directory, summary.tables, config, logger, console)
         print_line(f"its report: {report.name}", console)
     print_line(f"comparison: {directory}", console)
     for name, reason in failures.items():

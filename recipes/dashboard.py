@@ -9,8 +9,8 @@ import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
 
 from pathlib import Path
 
-from hyuav.configuration import Config, recipe, section
-from hyuav.dashboard.serve import Dashboard, serve
+from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.viz.dashboard.serve import Dashboard, serve
 
 
 @recipe("dashboard", Dashboard, groups={}, sections={}, run_directory=".")

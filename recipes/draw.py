@@ -12,12 +12,12 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
-from hyuav.configuration import Config, recipe, section
-from hyuav.errors import InputError
-from hyuav.figures.gallery import FIGURES, draw
-from hyuav.parameters import Parameters, choice, one_or_more, optional, parameter, text
-from hyuav.runs import RunDirectory, require_writable
-from hyuav.terminal import print_line
+from hyuav._support.errors import InputError
+from hyuav._support.parameters import Parameters, choice, one_or_more, optional, parameter, text
+from hyuav._support.terminal import print_line
+from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.experiments.run_directory import RunDirectory, require_writable
+from hyuav.viz.paper.gallery import FIGURES, draw
 
 
 @dataclass(frozen=True)

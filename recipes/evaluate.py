@@ -15,17 +15,30 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
-from hyuav.configuration import Config, recipe, section
-from hyuav.errors import InputError, rejection
-from hyuav.evaluation import EVALUATION_FILE, FLIGHTS_FILE, EvaluationParameters, evaluate
-from hyuav.evaluation_table import print_results
-from hyuav.experiment import learned_policies, reference_policies
-from hyuav.figures import save_flight_map
-from hyuav.parameters import Parameters, count, one_or_more, optional, parameter, text, thread_count
-from hyuav.report.page import write_run_report
-from hyuav.runs import RunDirectory, require_writable
-from hyuav.terminal import make_progress, print_line
-from hyuav.tracking import EvaluationLoggerParameters, log_evaluation
+from hyuav._support.errors import InputError, rejection
+from hyuav._support.parameters import (
+    Parameters,
+    count,
+    one_or_more,
+    optional,
+    parameter,
+    text,
+    thread_count,
+)
+from hyuav._support.terminal import make_progress, print_line
+from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.experiments.evaluation import (
+    EVALUATION_FILE,
+    FLIGHTS_FILE,
+    EvaluationParameters,
+    evaluate,
+)
+from hyuav.experiments.evaluation_table import print_results
+from hyuav.experiments.experiment import learned_policies, reference_policies
+from hyuav.experiments.run_directory import RunDirectory, require_writable
+from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
+from hyuav.viz.html.page import write_run_report
+from hyuav.viz.paper import save_flight_map
 
 
 @dataclass(frozen=True)

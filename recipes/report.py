@@ -12,11 +12,18 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
-from hyuav.configuration import Config, recipe, section
-from hyuav.errors import InputError
-from hyuav.parameters import Parameters, one_or_more, optional, parameter, text, thread_count
-from hyuav.report.page import write_report
-from hyuav.terminal import print_line
+from hyuav._support.errors import InputError
+from hyuav._support.parameters import (
+    Parameters,
+    one_or_more,
+    optional,
+    parameter,
+    text,
+    thread_count,
+)
+from hyuav._support.terminal import print_line
+from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.viz.html.page import write_report
 
 
 @dataclass(frozen=True)

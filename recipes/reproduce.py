@@ -21,22 +21,8 @@ import torch
 from rich.console import Console
 from torch import Tensor
 
-from hyuav.configuration import Config, recipe, same_call, section, telling_how_to_go_on
-from hyuav.errors import InputError, rejection
-from hyuav.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
-from hyuav.evaluation_table import print_results
-from hyuav.experiment import (
-    LEARNED_AS_IN_PAPER,
-    learned_policies,
-    reference_policies,
-    select_initial_weights,
-    train_or_resume,
-)
-from hyuav.figures.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
-from hyuav.learning.algorithms import DDPG
-from hyuav.learning.cohort import Learner
-from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import (
+from hyuav._support.errors import InputError, rejection
+from hyuav._support.parameters import (
     Parameters,
     choice,
     count,
@@ -46,13 +32,27 @@ from hyuav.parameters import (
     text,
     thread_count,
 )
-from hyuav.report.page import write_run_report
-from hyuav.runs import RunConfiguration, RunDirectory
-from hyuav.scenario import PRESETS, Scenario
-from hyuav.schemes.optimum import require_resolution
-from hyuav.system import SCHEMES
-from hyuav.terminal import make_progress, print_line
-from hyuav.tracking import LoggerParameters, log_evaluation, part_of
+from hyuav._support.terminal import make_progress, print_line
+from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
+from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.experiments.evaluation_table import print_results
+from hyuav.experiments.experiment import (
+    LEARNED_AS_IN_PAPER,
+    learned_policies,
+    reference_policies,
+    select_initial_weights,
+    train_or_resume,
+)
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
+from hyuav.learning.cohort import Learner
+from hyuav.learning.ddpg import DDPG
+from hyuav.learning.training import TrainingParameters
+from hyuav.physics.scenario import PRESETS, Scenario
+from hyuav.physics.slot import SCHEMES
+from hyuav.references.optimum import require_resolution
+from hyuav.viz.html.page import write_run_report
+from hyuav.viz.paper.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
 
 
 @dataclass(frozen=True)

@@ -13,20 +13,8 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
-from hyuav.configuration import (
-    Config,
-    given,
-    override,
-    recipe,
-    remove_if_empty,
-    section,
-    telling_how_to_go_on,
-)
-from hyuav.errors import InputError, rejection
-from hyuav.experiment import resume, saved_weights, train_or_resume
-from hyuav.learning.cohort import Learner
-from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import (
+from hyuav._support.errors import InputError, rejection
+from hyuav._support.parameters import (
     Parameters,
     choice,
     count,
@@ -37,11 +25,23 @@ from hyuav.parameters import (
     text,
     thread_count,
 )
-from hyuav.report.page import write_run_report
-from hyuav.runs import RunConfiguration, RunDirectory
-from hyuav.system import SCHEMES
-from hyuav.terminal import print_line
-from hyuav.tracking import LoggerParameters
+from hyuav._support.terminal import print_line
+from hyuav.experiments.configuration import (
+    Config,
+    given,
+    override,
+    recipe,
+    remove_if_empty,
+    section,
+    telling_how_to_go_on,
+)
+from hyuav.experiments.experiment import resume, saved_weights, train_or_resume
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.tracking import LoggerParameters
+from hyuav.learning.cohort import Learner
+from hyuav.learning.training import TrainingParameters
+from hyuav.physics.slot import SCHEMES
+from hyuav.viz.html.page import write_run_report
 
 
 @dataclass(frozen=True)

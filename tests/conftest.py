@@ -14,12 +14,13 @@ from hypothesis import settings
 
 import hyuav  # noqa: F401 - registers the environments
 from hyuav import Scenario
-from hyuav.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
-from hyuav.schemes.linear import ja_lt, re_lt
-from hyuav.schemes.optimum import FlightPolicy, solve
+from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.references.optimum import FlightPolicy, solve
+from hyuav.references.straight import ja_lt, re_lt
 from recipe_calls import Call, Refusal
 
 RECIPES = Path(__file__).parents[1] / "recipes"
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "__main__.py"
 
 torch.set_num_threads(1)
 settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=True)
@@ -81,7 +82,8 @@ def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Call]:
     """Run a recipe with arguments in an empty directory."""
 
     def run(name: str, *arguments: str) -> None:
-        spec = importlib.util.spec_from_file_location(name, RECIPES / f"{name}.py")
+        path = BENCHMARKS if name == "benchmark" else RECIPES / f"{name}.py"
+        spec = importlib.util.spec_from_file_location(name, path)
         assert spec is not None
         assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)

@@ -5,10 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hyuav import Scenario
-from hyuav.learning.algorithms import DDPG
+from hyuav.experiments.run_directory import METRIC_COLUMNS, RunConfiguration, RunDirectory
 from hyuav.learning.cohort import Learner
+from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters
-from hyuav.runs import METRIC_COLUMNS, RunConfiguration, RunDirectory
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
 

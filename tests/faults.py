@@ -13,9 +13,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hyuav.experiment import new_training
-from hyuav.runs import RunConfiguration, RunDirectory
-from hyuav.tracking import LoggerParameters, Tracker
+from hyuav.experiments.experiment import new_training
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.tracking import LoggerParameters, Tracker
 
 MEGABYTE = 2**20
 

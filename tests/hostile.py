@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
-from hyuav.errors import InputError
+from hyuav._support.errors import InputError
 
 Result = TypeVar("Result")
 

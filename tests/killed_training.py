@@ -12,13 +12,13 @@ import torch
 from rich.console import Console
 
 from hyuav import Scenario
-from hyuav.experiment import resume, train
-from hyuav.learning.algorithms import RobustDDPG
+from hyuav.experiments.experiment import resume, train
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.checkpoint import load_checkpoint
 from hyuav.learning.cohort import Learner
+from hyuav.learning.robust import RobustDDPG
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.runs import RunConfiguration, RunDirectory
-from hyuav.tracking import LoggerParameters
 
 OFF = LoggerParameters(mode="disabled")
 

@@ -10,13 +10,13 @@ import pytest
 from rich.console import Console
 
 from hyuav import Scenario
-from hyuav.evaluation import EvaluationParameters, evaluate
-from hyuav.experiment import learned_policies, reference_policies, train
-from hyuav.learning.algorithms import DDPG
+from hyuav.experiments.evaluation import EvaluationParameters, evaluate
+from hyuav.experiments.experiment import learned_policies, reference_policies, train
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.cohort import Learner
+from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters
-from hyuav.runs import RunConfiguration, RunDirectory
-from hyuav.tracking import LoggerParameters
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=12)
 SILENT = Console(file=io.StringIO())

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from hyuav import Learner, Scenario, Training, TrainingParameters, make_env
-from hyuav.learning.algorithms import ALGORITHMS
+from hyuav.learning.registry import ALGORITHMS
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 LEARNERS = [Learner("hybrid", 0), Learner("relay", 1, 4)]

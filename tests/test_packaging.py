@@ -100,7 +100,7 @@ def test_the_wheel_makes_environments_and_presets(installed: Path, tmp_path: Pat
         "env = gymnasium.make('hyuav/SecureOffloading-v0', scenario='random_disk')\n"
         "observation, _ = env.reset(seed=0)\n"
         "print(hyuav.__file__, observation.shape, hyuav.Scenario.preset('two_clusters').num_ues)\n"
-        "import hyuav.report.page\n"
+        "import hyuav.viz.html.page\n"
     )
     shown = run(installed, tmp_path, "-c", program)
     assert shown.split(maxsplit=1) == [str(installed / "hyuav/__init__.py"), "(15,) 10\n"]

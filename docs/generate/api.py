@@ -7,45 +7,16 @@ from importlib.util import find_spec
 import hyuav
 
 ROOMS = {
-    "scenario": "Scenarios and parameters",
-    "model": "The paper's equations",
+    "physics": "Scenarios and the paper's equations",
     "envs": "Environments",
-    "schemes": "References and the optimum",
+    "references": "Straight flights and the optimum",
     "learning": "Learning",
-    "evaluation": "Evaluation",
-    "comparison": "Comparison",
-    "figures": "Figures",
-    "report": "Reports",
-    "tracking": "Tracking",
-    "dashboard": "Dashboard",
-    "benchmark": "Benchmark",
-    "recipes": "Recipes and runs",
+    "experiments": "Runs, evaluation, comparison, tracking",
+    "viz": "Figures, reports, dashboard",
 }
 """Pages and their titles."""
 
-SHARED = {
-    "scenario": ("hyuav.scenario", "hyuav.layouts", "hyuav.parameters", "hyuav.errors"),
-    "envs": ("hyuav.system", "hyuav.randomness", "hyuav.recording"),
-    "evaluation": (
-        "hyuav.evaluation",
-        "hyuav.evaluation_table",
-        "hyuav.intervals",
-        "hyuav.maps",
-    ),
-    "recipes": (
-        "hyuav.experiment",
-        "hyuav.runs",
-        "hyuav.metrics",
-        "hyuav.metrics_file",
-        "hyuav.files",
-        "hyuav.durable",
-        "hyuav.interruption",
-        "hyuav.cluster",
-        "hyuav.configuration",
-        "hyuav.configuration_files",
-        "hyuav.terminal",
-    ),
-}
+SHARED = {"physics": ("hyuav._support.errors", "hyuav._support.parameters")}
 """Modules that stand beside the packages, by the page that shows them."""
 
 

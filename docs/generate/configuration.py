@@ -16,11 +16,11 @@ from typing import Any
 from hydra.core.config_store import ConfigStore
 from omegaconf import OmegaConf
 
-from hyuav.errors import InputError
-from hyuav.learning.algorithms.registry import ALGORITHMS, BUILT_IN
+from hyuav._support.errors import InputError
+from hyuav._support.parameters import Converter, Parameters
 from hyuav.learning.cohort import Learner
-from hyuav.parameters import Converter, Parameters
-from hyuav.scenario import PRESETS, Scenario
+from hyuav.learning.registry import ALGORITHMS, BUILT_IN
+from hyuav.physics.scenario import PRESETS, Scenario
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 
@@ -49,7 +49,7 @@ def configuration_page() -> str:
         "# Configuration",
         "What every field means is told with its equation in [The model](../model.md).",
         "## `scenario`",
-        f"[`hyuav.Scenario`][hyuav.scenario.Scenario]. Presets, which give `ue_positions`: "
+        f"[`hyuav.Scenario`][hyuav.physics.scenario.Scenario]. Presets, which give `ue_positions`: "
         f"{names}.",
         table(Scenario),
     ]

@@ -23,7 +23,7 @@ class RayLauncherConf:
 
     _target_: str = "hydra_plugins.hyuav_ray_launcher.RayLauncher"
     address: str = "local"
-    """As :func:`hyuav.cluster.connected` takes it."""
+    """As :func:`hyuav.experiments.cluster.connected` takes it."""
     workers: int | None = None
     """Of a local Ray; one for each core where it is None."""
 
@@ -54,8 +54,11 @@ class RayLauncher(Launcher):
         self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
     ) -> Sequence[JobReturn]:
         """Run the jobs; what became of each, in their order."""
-        from hyuav.cluster import connected, outcomes  # this module is imported by every command
-        from hyuav.recording import cores
+        from hyuav._support.machine import cores
+        from hyuav.experiments.cluster import (  # this module is imported by every command
+            connected,
+            outcomes,
+        )
 
         setup_globals()
         directory = Path(str(self._config.hydra.sweep.dir)).absolute()

@@ -4,14 +4,17 @@ import os
 
 import gymnasium
 
+from hyuav._support.errors import InputError, InputTypeError
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.envs.transforms import make_env
-from hyuav.errors import InputError, InputTypeError
-from hyuav.learning.algorithms import DDPG, SAC, TD3, RobustDDPG, RobustSAC, RobustTD3
-from hyuav.learning.algorithms.registry import OWN_FILES, register, run_own_files
 from hyuav.learning.cohort import Learner
+from hyuav.learning.ddpg import DDPG
+from hyuav.learning.registry import OWN_FILES, register, run_own_files
+from hyuav.learning.robust import RobustDDPG, RobustSAC, RobustTD3
+from hyuav.learning.sac import SAC
+from hyuav.learning.td3 import TD3
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.scenario import Scenario
+from hyuav.physics.scenario import Scenario
 
 __all__ = [
     "DDPG",

@@ -25,7 +25,9 @@ def _end(number: int, _: FrameType | None) -> None:
 
 
 def _tell(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
-    errors = sys.modules.get("hyuav.errors")  # importing it here could raise the same again
+    errors = sys.modules.get(
+        "hyuav._support.errors"
+    )  # importing it here could raise the same again
     if errors is None or not isinstance(error, errors.InputError):
         sys.__excepthook__(kind, error, traceback)
         return

@@ -66,7 +66,9 @@ def test_docstrings_link_to_what_they_name(site: Path) -> None:
 
 def test_parameters_show_their_defaults(site: Path) -> None:
     page = (site / "reference" / "api" / "scenario.html").read_text(encoding="utf-8")
-    signature = page[page.index('id="hyuav.scenario.Scenario"') :].partition("</code></pre>")[0]
+    signature = page[page.index('id="hyuav.physics.scenario.Scenario"') :].partition(
+        "</code></pre>"
+    )[0]
     text = re.sub(r"<[^>]+>", "", signature)
     assert "num_slots: int = 20" in text
     assert "parameter(" not in text

@@ -9,8 +9,8 @@ import torch
 from tensordict import TensorDictBase
 
 from hyuav import InputError, Scenario, make_env
-from hyuav.schemes.linear import ConstantVelocity
-from hyuav.system import SCHEMES
+from hyuav.physics.slot import SCHEMES
+from hyuav.references.straight import ConstantVelocity
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
 FULL_EDGE = dataclasses.replace(

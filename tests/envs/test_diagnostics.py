@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from hyuav import Scenario, SecureOffloadingEnv
-from hyuav.system import SCHEMES
+from hyuav.physics.slot import SCHEMES
 
 RANDOM_DISK = Scenario.preset("random_disk")
 QUIET = dataclasses.replace(RANDOM_DISK, fading=False)

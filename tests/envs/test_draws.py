@@ -8,10 +8,10 @@ import torch
 from scipy import stats
 
 from hyuav import InputError, Scenario
+from hyuav._support.randomness import GAMMA, splitmix64
 from hyuav.envs.draws import BatchDraws
 from hyuav.envs.transforms import make_env
-from hyuav.randomness import GAMMA, splitmix64
-from hyuav.system import SecureOffloadingSystem
+from hyuav.physics.slot import SecureOffloadingSystem
 from reference import assert_same
 
 SCENARIO = Scenario.preset("two_clusters")

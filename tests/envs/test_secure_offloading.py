@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import reference
 from hyuav import Scenario, SecureOffloadingEnv
-from hyuav.system import SCHEMES
+from hyuav.physics.slot import SCHEMES
 from reference import changed, fly, next_draws, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")

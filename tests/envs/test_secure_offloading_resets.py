@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from hyuav import InputError, Scenario, SecureOffloadingEnv
-from hyuav.system import SCHEMES
+from hyuav.physics.slot import SCHEMES
 from reference import assert_same, changed, fly, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")

@@ -10,7 +10,7 @@ from torchrl.collectors import Collector
 from torchrl.envs.utils import check_env_specs
 
 from hyuav import InputError, InputTypeError, Scenario, SecureOffloadingEnv
-from hyuav.system import SCHEMES
+from hyuav.physics.slot import SCHEMES
 from reference import changed, fly, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")

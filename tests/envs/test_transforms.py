@@ -12,7 +12,7 @@ from torchrl.envs.utils import check_env_specs
 
 import reference
 from hyuav import InputError, Scenario, SecureOffloadingEnv, make_env
-from hyuav.system import SCHEMES
+from hyuav.physics.slot import SCHEMES
 from reference import assert_same, fly, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")

@@ -22,14 +22,15 @@ from torch import Tensor
 
 from hostile import CASES, TRIED, anything, attempt, fuzz, mutated, texts
 from hyuav import InputError, Scenario
-from hyuav.errors import Halted
-from hyuav.experiment import learned_policy, resume, saved_weights, train
-from hyuav.learning.algorithms import DDPG, RobustSAC
+from hyuav._support.errors import Halted
+from hyuav.experiments.experiment import learned_policy, resume, saved_weights, train
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.checkpoint import FORMAT, load_checkpoint, save_checkpoint
 from hyuav.learning.cohort import Learner
+from hyuav.learning.ddpg import DDPG
+from hyuav.learning.robust import RobustSAC
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.runs import RunConfiguration, RunDirectory
-from hyuav.tracking import LoggerParameters
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0), (-3.0, 4.0)), num_slots=2)
 ALGORITHM = DDPG(hidden_sizes=(2,))

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from omegaconf import OmegaConf
 
+from benchmarks.plan import Benchmark
 from hostile import (
     CASES,
     TRIED,
@@ -26,16 +27,15 @@ from hostile import (
     texts,
 )
 from hyuav import Scenario
-from hyuav.benchmark.plan import Benchmark
-from hyuav.comparison.plan import Compare
-from hyuav.dashboard.serve import Dashboard
-from hyuav.evaluation import EvaluationParameters
-from hyuav.learning.algorithms import ALGORITHMS
+from hyuav._support.parameters import Parameters
+from hyuav.experiments.comparison.plan import Compare
+from hyuav.experiments.evaluation import EvaluationParameters
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.tracking import EvaluationLoggerParameters, LoggerParameters
 from hyuav.learning.cohort import Learner
+from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.training import TrainingParameters
-from hyuav.parameters import Parameters
-from hyuav.runs import RunConfiguration, RunDirectory
-from hyuav.tracking import EvaluationLoggerParameters, LoggerParameters
+from hyuav.viz.dashboard.serve import Dashboard
 
 Call = Callable[..., None]
 

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from hostile import CASES, PAYLOADS, TRIED, attempt, file_names, fuzz, texts
 from hyuav import Scenario
-from hyuav.dashboard import draft
-from hyuav.dashboard.index import RunIndex
-from hyuav.dashboard.plain import plain
-from hyuav.report.html import Page, Section, render
-from hyuav.report.style import scheme_label
-from hyuav.report.tables import configuration_tables, html_table
+from hyuav.viz.dashboard import draft
+from hyuav.viz.dashboard.index import RunIndex
+from hyuav.viz.dashboard.plain import plain
+from hyuav.viz.html.html import Page, Section, render
+from hyuav.viz.html.style import scheme_label
+from hyuav.viz.html.tables import configuration_tables, html_table
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0),))
 
@@ -93,7 +93,7 @@ def test_a_page_whose_every_word_is_hostile_has_no_element_of_theirs() -> None:
 
 @pytest.mark.parametrize("name", PAYLOADS)
 def test_a_figure_ends_no_script(name: str) -> None:
-    from hyuav.report.html import _data
+    from hyuav.viz.html.html import _data
 
     figure = go.Figure(layout={"title": {"text": name.encode("utf-8", "replace").decode()}})
     assert "<" not in _data(figure)

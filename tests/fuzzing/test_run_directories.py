@@ -15,17 +15,17 @@ from hypothesis import strategies as st
 
 from hostile import CASES, PAYLOADS, TRIED, anything, attempt, fuzz, mutated, numbers, texts
 from hyuav import InputError, Scenario
-from hyuav.dashboard import curves, tables
-from hyuav.dashboard.flights_page import read_flights
-from hyuav.dashboard.growing import GrowingMetrics
-from hyuav.dashboard.index import RunIndex
-from hyuav.experiment import learned_policies
-from hyuav.report.curves import learning_figure
-from hyuav.report.page import write_report
-from hyuav.report.player import flight_player
-from hyuav.report.reading import readable_evaluation, readable_flights
-from hyuav.report.tables import scheme_table
-from hyuav.runs import RunDirectory, readable_metrics
+from hyuav.experiments.experiment import learned_policies
+from hyuav.experiments.run_directory import RunDirectory, readable_metrics
+from hyuav.viz.dashboard import curves, tables
+from hyuav.viz.dashboard.flights_page import read_flights
+from hyuav.viz.dashboard.growing import GrowingMetrics
+from hyuav.viz.dashboard.index import RunIndex
+from hyuav.viz.data.reading import readable_evaluation, readable_flights
+from hyuav.viz.html.curves import learning_figure
+from hyuav.viz.html.page import write_report
+from hyuav.viz.html.player import flight_player
+from hyuav.viz.html.tables import scheme_table
 
 pytest_plugins = "sample_runs"
 

@@ -11,11 +11,11 @@ from omegaconf import OmegaConf
 
 from hostile import CASES, TRIED, attempt, fuzz, mutated, texts
 from hyuav import InputError, Scenario
-from hyuav.dashboard.index import RunIndex
-from hyuav.dashboard.tables import differences
-from hyuav.parameters import DEEPEST_YAML, LARGEST_YAML, read_yaml
-from hyuav.report.reading import readable_config
-from hyuav.report.tables import configuration_tables
+from hyuav._support.parameters import DEEPEST_YAML, LARGEST_YAML, read_yaml
+from hyuav.viz.dashboard.index import RunIndex
+from hyuav.viz.dashboard.tables import differences
+from hyuav.viz.data.reading import readable_config
+from hyuav.viz.html.tables import configuration_tables
 
 SAVED = OmegaConf.to_yaml(Scenario.preset("random_disk").to_dict()).encode()
 

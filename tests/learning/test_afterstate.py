@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hyuav import Scenario, make_env
 from hyuav.learning.afterstate import Afterstate
-from hyuav.learning.algorithms import DDPG
+from hyuav.learning.ddpg import DDPG
 
 SCENARIO = Scenario.preset("two_clusters")
 

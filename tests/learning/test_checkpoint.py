@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from faults import small_disk
-from hyuav.errors import InputError
+from hyuav._support.errors import InputError
 from hyuav.learning.checkpoint import load_checkpoint, load_weights_file, save_checkpoint
 
 

@@ -7,10 +7,10 @@ import torch
 from scipy import stats
 
 from hyuav import Scenario
-from hyuav.learning.algorithms import ALGORITHMS
 from hyuav.learning.cohort import Learner
+from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.schemes.optimum import solve
+from hyuav.references.optimum import solve
 
 EASY = dataclasses.replace(
     Scenario.preset("two_clusters"), helper_start=(20.0, 20.0), num_slots=10, fading=False

@@ -5,7 +5,7 @@ import torch
 from tensordict import TensorDictBase
 
 from batches import TEN_UES, mini_batch
-from hyuav.learning.algorithms import DDPG
+from hyuav.learning.ddpg import DDPG
 from hyuav.learning.targets import raise_target
 
 WORTH = 3.0

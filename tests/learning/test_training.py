@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from hyuav import Scenario
-from hyuav.errors import InputError, InputTypeError
-from hyuav.learning.algorithms import ALGORITHMS
+from hyuav._support.errors import InputError, InputTypeError
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from hyuav.learning.cohort import Learner
+from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.learning.weights import copy_weights, select_learner
 

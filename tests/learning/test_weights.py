@@ -5,8 +5,9 @@ import torch
 from tensordict import TensorDict
 
 from batches import TEN_UES
-from hyuav.errors import InputError
-from hyuav.learning.algorithms import ALGORITHMS, DDPG
+from hyuav._support.errors import InputError
+from hyuav.learning.ddpg import DDPG
+from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.weights import (
     copy_weights,
     count_learners,

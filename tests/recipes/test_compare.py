@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks import plan
 from faults import leave_overflowing
-from hyuav.benchmark import plan
-from hyuav.learning.algorithms import RobustDDPG
-from hyuav.runs import RunDirectory
+from hyuav.experiments.run_directory import RunDirectory
+from hyuav.learning.robust import RobustDDPG
 from recipe_calls import TINY_COMPARISON, Call, Refusal
 
 Printed = pytest.CaptureFixture[str]

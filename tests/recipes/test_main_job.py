@@ -7,9 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from hyuav.figures.gallery import FIGURES
-from hyuav.runs import RunDirectory
-from hyuav.scenario import PRESETS
+from hyuav.experiments.run_directory import RunDirectory
+from hyuav.physics.scenario import PRESETS
+from hyuav.viz.paper.gallery import FIGURES
 from offline_wandb import history, offline_runs, recorded
 from recipe_calls import TINY, Call, Refusal
 

@@ -10,7 +10,7 @@ import pandas as pd
 import psutil
 import pytest
 
-from hyuav.runs import RunDirectory, readable_metrics
+from hyuav.experiments.run_directory import RunDirectory, readable_metrics
 from recipe_calls import TINY, Call, Refusal
 
 RECIPES = Path(__file__).parents[2] / "recipes"

@@ -11,8 +11,8 @@ import pytest
 from omegaconf import OmegaConf
 
 from hyuav import Scenario
-from hyuav.learning.algorithms import DDPG
-from hyuav.runs import RunDirectory
+from hyuav.experiments.run_directory import RunDirectory
+from hyuav.learning.ddpg import DDPG
 from recipe_calls import TINY, Call, Refusal
 
 NAMES = "ddpg, ddpg_robust, sac, sac_robust, td3, td3_robust"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from hyuav.runs import RunDirectory
+from hyuav.experiments.run_directory import RunDirectory
 from recipe_calls import Call, Refusal
 
 pytest_plugins = "sample_runs"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from hyuav.runs import RunDirectory, readable_metrics
+from hyuav.experiments.run_directory import RunDirectory, readable_metrics
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import torch
 
-from hyuav.errors import InputError, InputTypeError, rejection, require_choice
-from hyuav.scenario import Scenario
-from hyuav.system import SCHEMES
+from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav.physics.scenario import Scenario
+from hyuav.physics.slot import SCHEMES
 
 
 def as_scenario(scenario: Scenario | str) -> Scenario:

@@ -11,8 +11,8 @@ from torch.fx import Graph, Node
 from torch.fx.experimental.proxy_tensor import make_fx
 from torchrl.envs import TransformedEnv
 
+from hyuav._support.recording import COMPILATION_ERRORS, compile_graph, has_compiler
 from hyuav.envs.draws import GivenDraws
-from hyuav.recording import COMPILATION_ERRORS, compile_graph, has_compiler
 
 Flight = Callable[..., tuple[Tensor, ...]]
 

@@ -7,9 +7,9 @@ from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 from torchrl.data import Binary, Composite, Unbounded
 
-from hyuav.model import energy
-from hyuav.model.flight import Move
-from hyuav.system import ModeOutcome, SecureOffloadingSystem, Tasks
+from hyuav.physics import energy
+from hyuav.physics.motion import Move
+from hyuav.physics.slot import ModeOutcome, SecureOffloadingSystem, Tasks
 
 
 def diagnostics_spec(batch_size: torch.Size, num_ues: int, device: torch.device) -> Composite:

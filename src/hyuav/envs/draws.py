@@ -6,9 +6,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from hyuav.model.channel import RicianFading
-from hyuav.randomness import GAMMA, derived_seed, polar, splitmix64, uniform
-from hyuav.system import SecureOffloadingSystem, Tasks
+from hyuav._support.randomness import GAMMA, derived_seed, polar, splitmix64, uniform
+from hyuav.physics.channel import RicianFading
+from hyuav.physics.slot import SecureOffloadingSystem, Tasks
 
 NUMBERS_AT_ONCE = 2**14
 """Drawn for as many slots as this suffices for, but at least one."""

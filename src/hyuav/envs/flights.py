@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from tensordict import TensorDict, TensorDictBase
 from torchrl.envs import TransformedEnv
 
+from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.envs.rendering import FlightRecorder
-from hyuav.errors import InputError, InputTypeError, rejection, require_choice
-from hyuav.scenario import Scenario
+from hyuav.physics.scenario import Scenario
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]

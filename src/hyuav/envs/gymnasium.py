@@ -10,11 +10,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from hyuav._support.errors import InputError, rejection
 from hyuav.envs.arguments import as_seed
 from hyuav.envs.flights import RENDERING, Flags, Flights, Floats, accepted_options
 from hyuav.envs.transforms import make_env
-from hyuav.errors import InputError, rejection
-from hyuav.scenario import Scenario
+from hyuav.physics.scenario import Scenario
 
 
 class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):

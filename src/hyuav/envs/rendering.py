@@ -17,10 +17,10 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-from hyuav.errors import InputError, rejection
-from hyuav.model.channel import horizontal_distance
-from hyuav.model.offloading import covered_by_legitimate, covered_by_relay
-from hyuav.scenario import Point, Scenario
+from hyuav._support.errors import InputError, rejection
+from hyuav.physics.channel import horizontal_distance
+from hyuav.physics.offloading import covered_by_legitimate, covered_by_relay
+from hyuav.physics.scenario import Point, Scenario
 
 OKABE_ITO = {
     "black": "#000000",

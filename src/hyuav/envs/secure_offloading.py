@@ -9,6 +9,8 @@ from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
+from hyuav._support.errors import InputError, rejection
+from hyuav._support.parameters import switch
 from hyuav.envs.arguments import (
     as_batch_size,
     as_device,
@@ -19,11 +21,9 @@ from hyuav.envs.arguments import (
 )
 from hyuav.envs.diagnostics import Slot, diagnose, diagnostics_spec
 from hyuav.envs.draws import BatchDraws, Draws, RowDraws
-from hyuav.errors import InputError, rejection
-from hyuav.model.offloading import prefers_relay
-from hyuav.parameters import switch
-from hyuav.scenario import Scenario
-from hyuav.system import SecureOffloadingSystem
+from hyuav.physics.offloading import prefers_relay
+from hyuav.physics.scenario import Scenario
+from hyuav.physics.slot import SecureOffloadingSystem
 
 
 class SecureOffloadingEnv(EnvBase):

@@ -8,10 +8,10 @@ from torch import Tensor
 from torchrl.data import Composite, Unbounded
 from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
+from hyuav._support.parameters import switch
 from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
-from hyuav.parameters import switch
-from hyuav.scenario import Scenario
+from hyuav.physics.scenario import Scenario
 
 WITHIN = 1.0 - 1e-6
 """Of half the map's side, as near to the edge as flights should end: rounding leads no further."""

@@ -4,8 +4,8 @@ import torch
 from torch import Tensor, nn
 
 from hyuav.envs.transforms import fenced
-from hyuav.scenario import Scenario
-from hyuav.system import SecureOffloadingSystem
+from hyuav.physics.scenario import Scenario
+from hyuav.physics.slot import SecureOffloadingSystem
 
 BLUR = 0.02
 """Of the coverage's edge, in units of the map's side; so that a gradient is felt beside it."""

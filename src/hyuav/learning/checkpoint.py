@@ -8,9 +8,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from hyuav.durable import write_durably
-from hyuav.errors import InputError, brief, rejection
-from hyuav.files import read_regular
+from hyuav._support.durable import write_durably
+from hyuav._support.errors import InputError, brief, rejection
+from hyuav._support.files import read_regular
 
 FORMAT = "hyuav-checkpoint-1"
 

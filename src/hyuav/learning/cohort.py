@@ -10,13 +10,21 @@ from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.collectors import Collector
 
+from hyuav._support.parameters import Parameters, choice, count, optional, parameter
+from hyuav._support.randomness import (
+    RowStream,
+    derived_seed,
+    given_normals,
+    standard_normal,
+    uniform,
+)
 from hyuav.envs.transforms import make_env
-from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.imagination import Imagination
-from hyuav.learning.repetition import as_planned
+from hyuav.learning.algorithm import AlgorithmParameters
+from hyuav.learning.compile import CompiledSlots, Flown, all_finite
+from hyuav.learning.guide.demonstrations import as_planned
+from hyuav.learning.guide.planner import FlightSearch
+from hyuav.learning.guide.proposals import Imagination
 from hyuav.learning.replay import clear_unused, forget, latest, make_replay
-from hyuav.learning.search import FlightSearch
-from hyuav.learning.slots import CompiledSlots, Flown, all_finite
 from hyuav.learning.state import with_own_memory
 from hyuav.learning.weights import (
     copy_weights,
@@ -26,10 +34,8 @@ from hyuav.learning.weights import (
     load_weights,
     replace_learners,
 )
-from hyuav.parameters import Parameters, choice, count, optional, parameter
-from hyuav.randomness import RowStream, derived_seed, given_normals, standard_normal, uniform
-from hyuav.scenario import Scenario
-from hyuav.system import SCHEMES
+from hyuav.physics.scenario import Scenario
+from hyuav.physics.slot import SCHEMES
 
 
 @dataclass(frozen=True)
@@ -167,7 +173,7 @@ class Cohort:
         """Fly from the next episode on by compiled programs; see :class:`CompiledSlots`.
 
         Raises:
-            Exception: one of :data:`hyuav.recording.COMPILATION_ERRORS`.
+            Exception: one of :data:`hyuav._support.recording.COMPILATION_ERRORS`.
         """
         if self._compiled is None:
             self._compiled = CompiledSlots(

@@ -5,7 +5,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from hyuav.scenario import Scenario
+from hyuav.physics.scenario import Scenario
 
 BEYOND = 1.25
 """Where destinations are drawn, in units of the map; those beyond it are brought to its edge."""

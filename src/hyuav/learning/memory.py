@@ -1,15 +1,14 @@
 """How much memory a training takes, estimated before any of it is taken."""
 
-import math
-import os
 from itertools import pairwise
 
 import torch
 
-from hyuav.errors import InputError, rejection
-from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.control_variate import HIDDEN_SIZES
-from hyuav.learning.expectation import MANY_UES, POLYNOMIAL
+from hyuav._support.errors import InputError, rejection
+from hyuav._support.machine import device_memory
+from hyuav.learning.algorithm import AlgorithmParameters
+from hyuav.learning.guide.control_variate import HIDDEN_SIZES
+from hyuav.learning.guide.reward_model import MANY_UES, POLYNOMIAL
 
 COPIES = 16
 """Of the weights of the largest network: networks, targets, moments, gradients and best weights."""
@@ -69,13 +68,3 @@ def require_memory(
             f"{_FLOAT * sum(needed.values()) / 2**30:.3g} GiB"
         )
         raise InputError(rejection(name, value[name], accepted))
-
-
-def device_memory(device: torch.device) -> float:
-    """Bytes that the device has; infinity where that cannot be known."""
-    if device.type == "cuda":
-        return float(torch.cuda.get_device_properties(device).total_memory)
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):
-        return math.inf

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import torch
 from torch import Tensor
 
-from hyuav.errors import InputError, InputTypeError, brief, rejection
-from hyuav.parameters import count, number
+from hyuav._support.errors import InputError, InputTypeError, brief, rejection
+from hyuav._support.parameters import count, number
 
 if TYPE_CHECKING:
     from hyuav.learning.cohort import Cohort

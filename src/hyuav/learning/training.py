@@ -12,14 +12,9 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from hyuav.envs.arguments import as_device
-from hyuav.errors import InputError, InputTypeError, one_line, rejection
-from hyuav.learning.algorithms import AlgorithmParameters
-from hyuav.learning.cohort import Cohort, Earned, Learner
-from hyuav.learning.memory import require_memory
-from hyuav.learning.state import require_entries, require_like, require_state
-from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
-from hyuav.parameters import (
+from hyuav._support.errors import InputError, InputTypeError, one_line, rejection
+from hyuav._support.machine import cores
+from hyuav._support.parameters import (
     Parameters,
     choice,
     count,
@@ -28,8 +23,14 @@ from hyuav.parameters import (
     switch,
     thread_count,
 )
-from hyuav.recording import COMPILATION_ERRORS, cores, has_compiler
-from hyuav.scenario import Scenario
+from hyuav._support.recording import COMPILATION_ERRORS, has_compiler
+from hyuav.envs.arguments import as_device
+from hyuav.learning.algorithm import AlgorithmParameters
+from hyuav.learning.cohort import Cohort, Earned, Learner
+from hyuav.learning.memory import require_memory
+from hyuav.learning.state import require_entries, require_like, require_state
+from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
+from hyuav.physics.scenario import Scenario
 
 COMPILE_SECONDS = 20.0
 """What compiling one program takes."""

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor, nn
 from torchrl.objectives import LossModule
 
-from hyuav.errors import InputError, brief
-from hyuav.randomness import derived_seed
+from hyuav._support.errors import InputError, brief
+from hyuav._support.randomness import derived_seed
 
 
 def _learner_axis(weights: Tensor) -> int:

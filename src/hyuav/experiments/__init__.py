@@ -1,0 +1,1 @@
+"""Run directories, evaluation, comparison, tracking: what is done with trainings."""

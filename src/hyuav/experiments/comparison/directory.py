@@ -1,0 +1,205 @@
+"""A comparison's directory: what was asked for, what is done, and what came of it."""
+
+import contextlib
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from omegaconf import OmegaConf
+
+from hyuav._support.durable import create_durably, write_durably
+from hyuav._support.errors import InputError, rejection
+from hyuav._support.parameters import read_yaml
+from hyuav.experiments.comparison.optima import Optima
+from hyuav.experiments.comparison.plan import PLAIN, Compare, parameters_of, training_episodes
+from hyuav.experiments.comparison.shards import Shard
+from hyuav.experiments.comparison.statistics import (
+    LAYOUTS,
+    improvements,
+    in_cells,
+    summarize_algorithms,
+    summarize_cells,
+)
+from hyuav.experiments.configuration import Config
+from hyuav.experiments.evaluation import EvaluationParameters
+from hyuav.experiments.run_directory import RunConfiguration, require_writable
+from hyuav.experiments.tracking import LoggerParameters
+from hyuav.learning.registry import ALGORITHMS, PEER
+from hyuav.learning.training import TrainingParameters
+from hyuav.references.optimum import require_resolution
+
+WORKING = ("workers", "engine", "address", "retries", "output", "logger", "training.cohorts")
+"""Entries of the configuration that change how the work is done and not what comes of it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Summary:
+    """What is told of the learners that have been trained."""
+
+    results: pd.DataFrame
+    """A row for each learner, as :func:`hyuav.experiments.comparison.shards.tables` gives them."""
+    curves: pd.DataFrame
+    """A row for each of its evaluations in training."""
+    cells: pd.DataFrame
+    algorithms: pd.DataFrame
+    layouts: pd.DataFrame
+    """As ``algorithms``, on the random layouts alone; empty where there are none."""
+    improvements: pd.DataFrame
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What is logged, by name."""
+        names = ("algorithms", "cells", "results", "layouts", "improvements")
+        return {name: getattr(self, name) for name in names}
+
+    def save(self, directory: Path) -> None:
+        """Write ``results``, ``curves`` and ``cells`` as Parquet, the rest as ``summary.json``.
+
+        Raises:
+            OSError: one of them cannot be written; then an earlier one is still there.
+        """
+        for name in ("results", "curves", "cells"):
+            write_durably(directory / f"{name}.parquet", getattr(self, name).to_parquet())
+        content = {
+            name: getattr(self, name).to_dict(orient="records")
+            for name in ("algorithms", "layouts", "improvements")
+        }
+        text = json.dumps(content, indent=2)
+        write_durably(directory / "summary.json", f"{text}\n".encode())
+
+
+class ComparisonDirectory:
+    """The files of one comparison.
+
+    ``config.yaml``; ``optima/``, the best flights of each scenario; ``shards/``, the trainings;
+    ``results.parquet``, ``curves.parquet``, ``cells.parquet`` and ``summary.json``, what came of
+    them; and ``figures/``.
+
+    Args:
+        path: of the directory, which may hold part of the same comparison.
+        config: all that was asked for.
+        options: what is compared.
+
+    Raises:
+        InputError: an unacceptable parameter, another comparison in the directory, or a place
+            that cannot be written to.
+        OSError: what was asked for cannot be kept, for want of space perhaps.
+    """
+
+    def __init__(self, path: Path, config: Config, options: Compare) -> None:
+        self.path, self.options = path, options
+        self._training = TrainingParameters.from_dict(config["training"])
+        self._evaluation = EvaluationParameters.from_dict(config["evaluation"])
+        self._logger = LoggerParameters.from_dict(config["logger"])
+        training_episodes(self._training)
+        scenarios = options.scenarios()
+        for scenario in scenarios.values():
+            resolution, longest = self._evaluation.resolution, max(options.num_slots)
+            require_resolution(resolution, scenario.map_side, longest)
+        if options.workers > 1 or options.engine == "ray":
+            self._training = dataclasses.replace(self._training, cohorts=1)
+        self._begin(config)
+        self.optima = {
+            name: Optima(
+                scenario,
+                options.num_slots,
+                self._evaluation.resolution,
+                path / "optima" / f"{name}.parquet",
+            )
+            for name, scenario in scenarios.items()
+        }
+        self.shards = [
+            self._shard(entry, name, num_slots, part)
+            for entry in options.entries
+            for name in self.optima
+            for num_slots in options.num_slots
+            for part in options.parts()
+        ]
+
+    def _begin(self, config: Config) -> None:
+        """Keep what was asked for, or find the same kept."""
+        hyperparameters = {name: parameters_of(name).to_dict() for name in self.options.entries}
+        request = {**config, "hyperparameters": hyperparameters}
+        file = self.path / "config.yaml"
+        require_writable("output", self.path)
+        with contextlib.suppress(FileExistsError):
+            create_durably(file, OmegaConf.to_yaml(request).encode())
+            return
+        try:
+            asked, kept = _entries(request), self._unsaid | _entries(read_yaml(file))
+        except InputError as error:
+            accepted = f"a comparison's directory (config.yaml: {error})"
+            raise InputError(rejection("output", str(self.path), accepted)) from None
+        for name in (*asked, *kept):
+            if asked.get(name) != kept.get(name):
+                accepted = (
+                    f"a comparison with {name} = {asked.get(name)} (there it is {kept.get(name)})"
+                )
+                raise InputError(rejection("output", str(self.path), accepted))
+
+    @property
+    def _unsaid(self) -> dict[str, Any]:
+        """Entries that older comparisons may not name; what they did not know was off."""
+        plain = {
+            f"hyperparameters.{entry}": ALGORITHMS[PLAIN[name]]().to_dict()
+            for entry in self.options.entries
+            if (name := entry.partition("-")[0]) != PEER
+        }
+        return _entries({"shard_learners": Compare.shard_learners, **plain})
+
+    def _shard(self, entry: str, name: str, num_slots: int, part: range) -> Shard:
+        learners = self.options.members
+        configuration = RunConfiguration(
+            name,
+            dataclasses.replace(self.optima[name].scenario, num_slots=num_slots),
+            learners[part.start : part.stop],
+            entry.partition("-")[0],
+            parameters_of(entry),
+            self._training,
+        )
+        return Shard(
+            entry,
+            configuration,
+            self._evaluation,
+            self.options.threshold,
+            self._logger,
+            self.optima[name],
+            self.path / "shards",
+            "" if len(part) == len(learners) else f"_{part.start}-{part.stop - 1}",
+        )
+
+    def summary(self) -> Summary | None:
+        """Of the shards that are finished; None where none is."""
+        finished = [kept for shard in self.shards if (kept := shard.kept()) is not None]
+        if not finished:
+            return None
+        results, curves = map(_joined, zip(*finished, strict=True))
+        threshold = self.options.threshold
+        on_layouts = results[in_cells(results)["scenario"] == LAYOUTS]
+        return Summary(
+            results,
+            curves,
+            summarize_cells(results, threshold),
+            summarize_algorithms(results, threshold),
+            summarize_algorithms(on_layouts, threshold),
+            improvements(results),
+        )
+
+
+def _joined(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """The rows of all tables; one without rows tells nothing of its columns' types."""
+    return pd.concat([own for own in tables if len(own)] or tables, ignore_index=True)
+
+
+def _entries(config: Config) -> dict[str, Any]:
+    """The entries on which results depend, by their dotted names."""
+    flat: dict[str, Any] = {}
+    for name, value in config.items():
+        if isinstance(value, dict):
+            flat |= {f"{name}.{key}": entry for key, entry in _entries(value).items()}
+        else:
+            flat[name] = value
+    return {name: value for name, value in flat.items() if not name.startswith(WORKING)}

@@ -1,0 +1,77 @@
+"""The best flights of a scenario, solved once and kept in a file."""
+
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from hyuav._support.durable import write_durably
+from hyuav._support.errors import InputError
+from hyuav._support.files import read_parquet
+from hyuav.experiments.evaluation import OPTIMA, Policy
+from hyuav.physics.scenario import Scenario
+from hyuav.references.optimum import FlightPolicy, solve_horizons
+
+
+@dataclass(frozen=True)
+class Optima:
+    """The best flight of each scheme over each horizon, in a Parquet file.
+
+    It has a row for each slot from 0: ``scheme``, ``num_slots``, ``value`` and
+    ``standard_error`` of the flight in bps/Hz, ``slot``, and ``x`` and ``y`` in m.
+    """
+
+    scenario: Scenario
+    """Whose ``num_slots`` is not used."""
+    horizons: tuple[int, ...]
+    resolution: float
+    """Of the grid in m."""
+    file: Path
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether the file holds every flight whole."""
+        try:
+            whole = self._flights().dropna(subset=["x", "y"])
+        except InputError:
+            return False
+        lengths = whole.groupby(["scheme", "num_slots"]).size()
+        every = itertools.product(OPTIMA, self.horizons)
+        return all(lengths.get((scheme, num_slots)) == num_slots + 1 for scheme, num_slots in every)
+
+    def solve(self) -> None:
+        """Find the flights and write the file."""
+        found = solve_horizons(self.scenario, self.horizons, resolution=self.resolution)
+        flights = [
+            pd.DataFrame(
+                {
+                    "scheme": scheme,
+                    "num_slots": num_slots,
+                    "value": optimum.value,
+                    "standard_error": optimum.standard_error,
+                    "slot": range(num_slots + 1),
+                    "x": optimum.path[:, 0],
+                    "y": optimum.path[:, 1],
+                }
+            )
+            for scheme, optima in found.items()
+            for num_slots, optimum in optima.items()
+        ]
+        write_durably(self.file, pd.concat(flights, ignore_index=True).to_parquet())
+
+    def policy(self, scheme: str, num_slots: int) -> Policy:
+        """The way to fly the best flight of a scheme over a horizon.
+
+        Raises:
+            InputError: the file is missing or damaged.
+        """
+        flights = self._flights()
+        flight = flights[(flights["scheme"] == scheme) & (flights["num_slots"] == num_slots)]
+        path = torch.tensor(flight.sort_values("slot")[["x", "y"]].to_numpy())
+        return Policy(FlightPolicy(path, self.scenario))
+
+    def _flights(self) -> pd.DataFrame:
+        columns = ["scheme", "num_slots", "value", "standard_error", "slot", "x", "y"]
+        return read_parquet(self.file, "best flights", columns)

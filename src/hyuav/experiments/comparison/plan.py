@@ -1,0 +1,184 @@
+"""What a comparison covers: algorithms, scenarios, schemes, horizons and seeds."""
+
+import dataclasses
+import itertools
+import math
+from dataclasses import dataclass
+
+from hyuav._support.errors import InputError, rejection
+from hyuav._support.machine import cores, require_installed
+from hyuav._support.parameters import (
+    Converter,
+    Parameters,
+    choice,
+    count,
+    number,
+    one_or_more,
+    parameter,
+    text,
+    thread_count,
+)
+from hyuav.experiments.cluster import LOCAL, require_ray
+from hyuav.experiments.evaluation import EvaluationParameters
+from hyuav.learning.algorithm import AlgorithmParameters
+from hyuav.learning.cohort import Learner
+from hyuav.learning.ddpg import DDPG
+from hyuav.learning.registry import ALGORITHMS, PEER
+from hyuav.learning.training import TrainingParameters
+from hyuav.physics.layout import random_layout
+from hyuav.physics.scenario import PRESETS, Scenario
+from hyuav.physics.slot import SCHEMES
+
+ENTRIES = (*ALGORITHMS, PEER)
+"""What can be compared."""
+
+PLAIN = {name: name.removesuffix("_robust") for name in ALGORITHMS}
+"""The algorithm that each is a variant of."""
+
+PIECES = tuple(
+    dict.fromkeys(
+        field.name
+        for name, plain in PLAIN.items()
+        for field in dataclasses.fields(ALGORITHMS[name])
+        if getattr(ALGORITHMS[name](), field.name) != getattr(ALGORITHMS[plain](), field.name)
+    )
+)
+"""Hyperparameters in which a variant differs from the algorithm that it is a variant of."""
+
+ENGINES = ("processes", "ray")
+"""What works the shards off."""
+
+LAYOUT = "layout-"
+"""With its seed behind, the name of a random layout's scenario."""
+
+
+def _any(convert: Converter) -> Converter:
+    """Accept an empty list too."""
+    return lambda name, value: () if value in ([], ()) else convert(name, value)
+
+
+_presets = _any(one_or_more(choice(*PRESETS), f"a list of {', '.join(PRESETS)}"))
+_pieces = _any(one_or_more(choice(*PIECES), f"a list of {', '.join(PIECES)}"))
+
+
+@dataclass(frozen=True)
+class Compare(Parameters):
+    """What is compared, and how the work is divided."""
+
+    algorithm: tuple[str, ...] = parameter(
+        one_or_more(choice(*ENTRIES), "algorithms"), ("ddpg", "ddpg_robust", "td3", "sac")
+    )
+    without: tuple[str, ...] = parameter(_pieces, ())
+    """Pieces of a variant, such as ``clock``: it is compared once more for each, without it."""
+    scenario: tuple[str, ...] = parameter(_presets, ("random_disk", "two_clusters"))
+    layouts: int = parameter(count(0, 100_000), 0)
+    """Random layouts, besides the presets; see :func:`hyuav.physics.layout.random_layout`."""
+    layouts_seed: int = parameter(count(0), 1000)
+    """Of the first; the others follow."""
+    scheme: tuple[str, ...] = parameter(one_or_more(choice(*SCHEMES), "schemes"), tuple(SCHEMES))
+    num_slots: tuple[int, ...] = parameter(
+        one_or_more(count(), "numbers of slots"), (10, 20), symbol="T"
+    )
+    learners: int = parameter(count(1, 100_000), 10)
+    """Of each algorithm, scenario, scheme and horizon; their seeds follow ``seed``."""
+    seed: int = parameter(count(0), 0)
+    threshold: float = parameter(number(0.0, 1.0), 0.97)
+    """Share of the optimum that counts as solved."""
+    shard_learners: int = parameter(count(), 60)
+    """The most learners that one worker trains side by side: about 0.7 GB of them (U = 10)."""
+    engine: str = parameter(choice(*ENGINES), "processes")
+    """What the workers are: processes of this machine, or those of Ray (extra ``cluster``)."""
+    address: str = parameter(text, LOCAL)
+    """Of Ray: one that is started for the work, "auto" for one that runs here, or HOST:PORT."""
+    workers: int = parameter(thread_count, cores())
+    """That train at the same time, by default as many as cores; one process is this one. A Ray
+    that runs has its own."""
+    retries: int = parameter(count(0), 2)
+    """How often a piece of work is begun again whose worker was lost, killed perhaps."""
+    output: str = parameter(text, "runs/${now:%Y-%m-%d_%H-%M-%S}_compare")
+    """Directory of the comparison, which may have been begun."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("algorithm", "without", "scenario", "scheme", "num_slots"):
+            values = getattr(self, name)
+            if len(set(values)) < len(values):
+                raise InputError(rejection(name, list(values), "values that differ"))
+        varied = {entry.partition("-")[0] for entry in self.entries if "-" in entry}
+        if len(varied) > 1:  # "without clock" would be a row of each
+            accepted = f"one variant at a time, not {', '.join(sorted(varied))}"
+            raise InputError(rejection("without", list(self.without), accepted))
+        if not self.scenario and not self.layouts:
+            accepted = "at least one preset, or layouts >= 1"
+            raise InputError(rejection("scenario", [], accepted))
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """What is compared: the algorithms, and after each variant the same without a piece."""
+        return tuple(
+            entry
+            for name in self.algorithm
+            for entry in (name, *(f"{name}-{piece}" for piece in self.without))
+            if entry == name or parameters_of(entry) != parameters_of(name)
+        )
+
+    @property
+    def members(self) -> tuple[Learner, ...]:
+        """The learners of each algorithm, scenario and horizon."""
+        seeds = range(self.seed, self.seed + self.learners)
+        return tuple(Learner(scheme, seed) for scheme in self.scheme for seed in seeds)
+
+    def parts(self) -> list[range]:
+        """Places in :attr:`members`, in near-equal parts of at most ``shard_learners``."""
+        several = len(self.scheme) * self.learners
+        bounds = range(math.ceil(several / self.shard_learners) + 1)
+        ends = [place * several // bounds[-1] for place in bounds]
+        return [range(start, stop) for start, stop in itertools.pairwise(ends)]
+
+    def scenarios(self) -> dict[str, Scenario]:
+        """By name, the presets and then the random layouts."""
+        seeds = range(self.layouts_seed, self.layouts_seed + self.layouts)
+        drawn = {f"{LAYOUT}{seed}": Scenario(ue_positions=random_layout(seed)) for seed in seeds}
+        return {name: Scenario.preset(name) for name in self.scenario} | drawn
+
+
+def parameters_of(entry: str) -> AlgorithmParameters:
+    """The hyperparameters with which an entry is compared.
+
+    Args:
+        entry: of :data:`ENTRIES`, or with a piece of :data:`PIECES` behind a hyphen, which is then
+            as in the plain algorithm; one that the algorithm does not have changes nothing.
+    """
+    name, _, piece = entry.partition("-")
+    if name == PEER:
+        return DDPG()
+    parameters: AlgorithmParameters = ALGORITHMS[name]()
+    if not hasattr(parameters, piece):
+        return parameters
+    plain = getattr(ALGORITHMS[PLAIN[name]](), piece)
+    return type(parameters).from_dict({**parameters.to_dict(), piece: plain})
+
+
+def training_episodes(training: TrainingParameters) -> EvaluationParameters:
+    """The episodes through which a training's evaluations fly.
+
+    Raises:
+        InputError: there is only one.
+    """
+    if training.evaluation_episodes < 2:
+        accepted = "a whole number >= 2"
+        raise InputError(rejection("evaluation_episodes", training.evaluation_episodes, accepted))
+    return EvaluationParameters(
+        episodes=training.evaluation_episodes, flights=1, seed=training.evaluation_seed
+    )
+
+
+def require_libraries(options: Compare) -> None:
+    """Accept entries and an engine whose libraries can be imported.
+
+    Raises:
+        InputError: naming those that cannot, and how to get them.
+    """
+    require_installed([name for name in options.algorithm if name == PEER], "bench")
+    if options.engine == "ray":
+        require_ray()

@@ -1,0 +1,122 @@
+"""Stable-Baselines3's DDPG as an entry of a comparison."""
+
+import copy
+import math
+import time
+from typing import Any
+
+import gymnasium
+import pandas as pd
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor, nn
+
+from hyuav.experiments.comparison.peer import ddpg_model
+from hyuav.experiments.comparison.plan import training_episodes
+from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
+from hyuav.experiments.experiment import LEARNED
+from hyuav.experiments.run_directory import RunConfiguration
+from hyuav.learning.cohort import Learner
+from hyuav.physics.scenario import Scenario
+
+
+class Actor(TensorDictModuleBase):
+    """An actor of Stable-Baselines3 as a way to fly batches.
+
+    Reads ``observation`` (..., U + 5), writes ``action`` (..., 2) in [-1, 1].
+
+    Args:
+        actor: maps (B, U + 5) to (B, 2).
+    """
+
+    in_keys = ("observation",)
+    out_keys = ("action",)
+
+    def __init__(self, actor: nn.Module) -> None:
+        super().__init__()
+        self.actor = actor
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the action of each helper in the batch."""
+        observation = tensordict["observation"]
+        action: Tensor = self.actor(observation.flatten(0, -2))
+        return tensordict.set("action", action.reshape(*observation.shape[:-1], 2))
+
+
+def train(
+    configuration: RunConfiguration, evaluation: EvaluationParameters
+) -> tuple[pd.DataFrame, list[float]]:
+    """Train the learners one after another, with the paper's hyperparameters.
+
+    They are evaluated as this project's own are, after as many episodes and in the same ones.
+
+    Args:
+        configuration: of the training; its algorithm's hyperparameters are the paper's.
+        evaluation: of each learner's best weights.
+
+    Returns:
+        a row for each evaluation and learner, as :func:`.shards.tables` takes them, and what each
+        learner's best weights earn in bps/Hz.
+    """
+    rows, sum_rates = [], []
+    for index, learner in enumerate(configuration.learners):
+        own, sum_rate = _train(configuration, learner, evaluation)
+        rows += [{"learner": index, **row} for row in own]
+        sum_rates.append(sum_rate)
+    return pd.DataFrame(rows), sum_rates
+
+
+def _train(
+    configuration: RunConfiguration, learner: Learner, evaluation: EvaluationParameters
+) -> tuple[list[dict[str, Any]], float]:
+    started, scenario, training = (
+        time.perf_counter(),
+        configuration.scenario,
+        configuration.training,
+    )
+    env = gymnasium.make(
+        "hyuav/SecureOffloading-v0",
+        scenario=scenario,
+        scheme=learner.scheme,
+        disable_env_checker=True,
+    )
+    model = ddpg_model(
+        "stable_baselines3",
+        env,
+        nn.Tanh,
+        batch_size=training.batch_size,
+        replay_size=training.replay_size,
+        seed=learner.seed,
+        device="cpu",
+    )
+    actor = Actor(model.policy.actor)
+    rows, episode, best, best_weights = [], 0, -math.inf, actor.state_dict()
+    while episode < training.num_episodes:
+        episodes = min(training.evaluation_every, training.num_episodes - episode)
+        slots = episodes * scenario.num_slots
+        model.learn(slots, reset_num_timesteps=False, log_interval=None)
+        episode += episodes
+        sum_rate, reward = _earned(scenario, learner.scheme, actor, training_episodes(training))
+        if reward > best:
+            best, best_weights = reward, copy.deepcopy(actor.state_dict())
+        rows.append(
+            {
+                "episode": episode,
+                "slots": episode * scenario.num_slots,
+                "seconds": time.perf_counter() - started,
+                "evaluation": reward,
+                "sum_rate": sum_rate,
+            }
+        )
+    actor.load_state_dict(best_weights)
+    return rows, _earned(scenario, learner.scheme, actor, evaluation)[0]
+
+
+def _earned(
+    scenario: Scenario, scheme: str, actor: Actor, episodes: EvaluationParameters
+) -> tuple[float, float]:
+    """Means over the episodes in bps/Hz: the secrecy sum-rate, and the reward with penalties."""
+    totals = fly(scenario, LEARNED[scheme], Policy(actor), episodes).totals
+    sum_rate = totals["secrecy_sum_rate"]
+    reward = sum_rate - scenario.off_map_penalty * totals["off_map"]
+    return float(sum_rate.mean()), float(reward.mean())

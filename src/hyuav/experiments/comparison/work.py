@@ -1,0 +1,53 @@
+"""Doing what is left of a comparison, and telling how far it is."""
+
+import sys
+from functools import partial
+
+from rich.console import Console
+
+from hyuav._support.terminal import make_progress
+from hyuav.experiments.comparison.directory import ComparisonDirectory
+from hyuav.experiments.comparison.optima import Optima
+from hyuav.experiments.comparison.processes import Workers
+from hyuav.experiments.comparison.ray import RayWorkers
+from hyuav.experiments.comparison.shards import Shard
+
+
+def work_off(comparison: ComparisonDirectory, console: Console) -> dict[str, str]:
+    """Find the optima that are missing, then train the shards that are not finished.
+
+    Of both, what is there but damaged is told in one line and made anew.
+
+    Args:
+        comparison: to complete.
+        console: on which a terminal shows the progress.
+
+    Returns:
+        the reason for each failure, by what failed.
+    """
+    failures: dict[str, str] = {}
+    options = comparison.options
+    begin = Workers if options.engine == "processes" else partial(RayWorkers, options.address)
+    unsolved = [own for own in comparison.optima.values() if not own.is_solved]
+    pending = [shard for shard in comparison.shards if not shard.is_finished]
+    for file in (*(own.file for own in unsolved), *(shard.path for shard in pending)):
+        if file.exists():
+            print(f"{file}: damaged or incomplete, and made anew", file=sys.stderr)
+    progress = make_progress(console, "{task.description}")
+    with progress, begin(options.workers, options.retries) as workers:
+        task = progress.add_task("optima", total=len(unsolved))
+        for optima, reason in workers.attempt_all(Optima.solve, unsolved):
+            progress.advance(task)
+            if reason is not None:
+                failures[f"optima of {optima.file.stem}"] = reason
+        lacking = {own.file for own in unsolved if not own.is_solved}
+        solved = [shard for shard in pending if shard.optima.file not in lacking]
+        finished = len(comparison.shards) - len(pending)
+        task = progress.add_task("shards", total=len(comparison.shards), completed=finished)
+        for shard, reason in workers.attempt_all(Shard.run, solved):
+            progress.advance(task)
+            if reason is not None:
+                failures[shard.name] = reason
+            elif not shard.is_finished:
+                failures[shard.name] = "its worker wrote it where it cannot be seen from here"
+    return failures

@@ -1,0 +1,307 @@
+"""Fly any set of schemes through the same fading and account for each in one table."""
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import torch
+from scipy import stats
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+
+from hyuav._support.durable import write_durably
+from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.parameters import Parameters, count, number, parameter
+from hyuav._support.randomness import derived_seed
+from hyuav.envs.transforms import make_env
+from hyuav.physics.scenario import Scenario
+from hyuav.references.optimum import RESOLUTION
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+EVALUATION_FILE, FLIGHTS_FILE = "evaluation.json", "flights.parquet"
+
+LABELS = {
+    "proposed": "Proposed",
+    "proposed_paper": "Paper Proposed",
+    "ja_ot": "Ja-OT",
+    "ja_ot_paper": "Paper Ja-OT",
+    "re_ot": "Re-OT",
+    "re_ot_paper": "Paper Re-OT",
+    "re_lt": "Re-LT",
+    "ja_lt": "Ja-LT",
+    "optimum": "Optimum",
+    "ja_optimum": "Ja-optimum",
+    "re_optimum": "Re-optimum",
+}
+"""The schemes in the order of the table, with the names that the paper gives them.
+
+Those that are learned by the paper's own algorithm, where another one is beside it, say so.
+"""
+
+MODE_RULES = {
+    "proposed": "hybrid",
+    "proposed_paper": "hybrid",
+    "optimum": "hybrid",
+    "ja_ot": "jamming",
+    "ja_ot_paper": "jamming",
+    "ja_lt": "jamming",
+    "ja_optimum": "jamming",
+    "re_ot": "relay",
+    "re_ot_paper": "relay",
+    "re_lt": "relay",
+    "re_optimum": "relay",
+}
+"""Who chooses the helper's mode in each scheme, a name of :data:`hyuav.physics.slot.SCHEMES`."""
+
+OPTIMA = {"hybrid": "optimum", "jamming": "ja_optimum", "relay": "re_optimum"}
+"""The optimum that a scheme with this mode rule is measured against."""
+
+
+@dataclass(frozen=True)
+class EvaluationParameters(Parameters):
+    """How to evaluate."""
+
+    episodes: int = parameter(count(2, 10**6), 1000)
+    flights: int = parameter(count(), 3)
+    seed: int = parameter(count(0), 10_000)
+    resolution: float = parameter(number(above=0.0), RESOLUTION, unit="m")
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A way to fly and what it needs to observe."""
+
+    module: TensorDictModuleBase
+    """Writes ``action`` (learners, ..., 2)."""
+    learners: int = 1
+    """How many it flies, each in one row."""
+    clock: bool = False
+    """Whether ``observation`` carries the slots flown."""
+    geofence: bool = False
+    """Whether its flights are slowed to end on the map."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a set of schemes brought in the same episodes."""
+
+    summary: dict[str, Any]
+    """The content of ``evaluation.json``."""
+    flights: pd.DataFrame
+    """A few episodes of each scheme, a row per slot."""
+
+    def save(self, directory: Path) -> None:
+        """Write ``evaluation.json`` and ``flights.parquet`` into ``directory``.
+
+        Raises:
+            OSError: one of them cannot be written; then an earlier one is still there.
+        """
+        text = json.dumps(self.summary, indent=2)
+        write_durably(directory / FLIGHTS_FILE, self.flights.to_parquet())
+        write_durably(directory / EVALUATION_FILE, f"{text}\n".encode())
+
+
+def evaluate(
+    scenario: Scenario,
+    name: str,
+    policies: Mapping[str, Sequence[Policy]],
+    parameters: EvaluationParameters,
+    device: torch.device | str | None = None,
+    *,
+    track: Callable[[Sequence[str]], Iterable[str]] = iter,
+) -> Evaluation:
+    """Fly every scheme through the same draws of fading and tasks.
+
+    Args:
+        scenario: node positions and parameters.
+        name: of the scenario, for the record.
+        policies: by scheme, names of :data:`LABELS`: one or more, as from several seeds.
+            Fractions of the optimum are given where the optima are among them.
+        parameters: how many episodes, how many of them kept slot by slot, and the seed.
+        device: to fly on.
+        track: passes on the schemes one by one, as what shows the progress does.
+
+    Raises:
+        InputError: no scheme, an unknown one, or one without a policy.
+    """
+    for scheme, several in policies.items():
+        require_choice("scheme", scheme, LABELS)
+        if not several:
+            raise InputError(rejection(f"policies[{scheme!r}]", several, "at least one policy"))
+    if not policies:
+        raise InputError(rejection("policies", policies, "at least one scheme"))
+    flown = {
+        scheme: _together(
+            [fly(scenario, scheme, policy, parameters, device) for policy in policies[scheme]]
+        )
+        for scheme in track([scheme for scheme in LABELS if scheme in policies])
+    }
+    returns = {
+        scheme: flights.totals["secrecy_sum_rate"].numpy() for scheme, flights in flown.items()
+    }
+    summary = {
+        "scenario": name,
+        "parameters": scenario.to_dict(),
+        "num_slots": scenario.num_slots,
+        "episodes": parameters.episodes,
+        "seed": parameters.seed,
+        "schemes": {
+            scheme: _returns(returns, scheme) | _account(flights.totals, scenario)
+            for scheme, flights in flown.items()
+        },
+    }
+    rows = [slot_table(scheme, flights.slots) for scheme, flights in flown.items()]
+    return Evaluation(summary, pd.concat(rows, ignore_index=True))
+
+
+@dataclass(frozen=True)
+class Flights:
+    """What the flights of one scheme brought, on the CPU."""
+
+    totals: dict[str, Tensor]
+    """Sums over the slots of each episode, as :func:`_per_slot` names them: (learners, episodes)
+    float64."""
+    slots: TensorDictBase
+    """What followed each slot of the first learner's first episodes: (flights, T)."""
+
+
+@torch.no_grad()
+def fly(
+    scenario: Scenario,
+    scheme: str,
+    policy: Policy,
+    parameters: EvaluationParameters,
+    device: torch.device | str | None = None,
+) -> Flights:
+    """Fly all learners of a policy through the same episodes, with diagnostics."""
+    batch_size = policy.learners, parameters.episodes
+    seeds = [derived_seed(parameters.seed, "evaluation")] * policy.learners
+    env = make_env(
+        scenario,
+        MODE_RULES[scheme],
+        batch_size,
+        device,
+        seeds,
+        diagnostics=True,
+        clock=policy.clock,
+        geofence=policy.geofence,
+    )
+    module = policy.module.to(env.device)
+    totals: dict[str, Tensor] = {}
+    state, slots = env.reset(), []
+    for _ in range(scenario.num_slots):
+        flown = env.step(module(state))
+        for name, values in _per_slot(flown["next"]).items():
+            totals[name] = totals[name] + values if name in totals else values.double()
+        slots.append(flown["next"][0, : parameters.flights].cpu())
+        state = env.step_mdp(flown)
+    return Flights(
+        {name: values.cpu() for name, values in totals.items()}, torch.stack(slots, dim=1)
+    )
+
+
+def _together(several: Sequence[Flights]) -> Flights:
+    """The flights of all learners, with the slots of the first."""
+    names = several[0].totals
+    totals = {name: torch.cat([flights.totals[name] for flights in several]) for name in names}
+    return Flights(totals, several[0].slots)
+
+
+def _per_slot(after: TensorDictBase) -> dict[str, Tensor]:
+    """How the helper flew and what each node spent in one slot: (learners, episodes)."""
+    diagnostics = after["diagnostics"]
+    return {
+        "secrecy_sum_rate": secrecy_sum_rate(after),
+        "relay_share": after["mode"].squeeze(-1),
+        "offloading_share": diagnostics["offloading"].float().mean(dim=-1),
+        "off_map": after["off_map"].squeeze(-1),
+        "budget_violations": diagnostics["budget_violation"].squeeze(-1),
+        "ue_energy": diagnostics["ue_energy"].mean(dim=-1),
+        "edge_energy": diagnostics["edge_energy"].squeeze(-1),
+        "helper_energy": diagnostics["helper_energy"].squeeze(-1),
+    }
+
+
+def secrecy_sum_rate(flown: TensorDictBase) -> Tensor:
+    """The secrecy sum-rate of a slot, without penalty: (...) bps/Hz."""
+    return flown["diagnostics", "secrecy_rate"].sum(dim=-1)
+
+
+def _returns(returns: Mapping[str, Array], scheme: str) -> dict[str, Any]:
+    """Mean return with its interval, and as a fraction of the optima flown in the same draws."""
+    own = returns[scheme]
+    mean = float(own.mean())
+    result: dict[str, Any] = {
+        "learners": len(own),
+        "secrecy_sum_rate": {"mean": mean, "ci95": confidence_interval(own)},
+    }
+    for field, optimum in (
+        ("fraction_of_optimum", OPTIMA[MODE_RULES[scheme]]),
+        ("fraction_of_hybrid_optimum", "optimum"),
+    ):
+        if optimum in returns and returns[optimum].mean() > 0:
+            result[field] = mean / float(returns[optimum].mean())
+    return result
+
+
+def confidence_interval(returns: Array) -> list[float]:
+    """The 95 % interval of the mean return by Student's t.
+
+    Args:
+        returns: (learners, episodes). Where several learners were flown, it is they that the
+            interval speaks of; with a single one, or a fixed flight, it speaks of the fading.
+
+    Returns:
+        the lower and the upper bound.
+    """
+    sample = returns.mean(axis=1) if len(returns) > 1 else returns[0]
+    if np.ptp(sample) == 0.0:
+        return [float(sample.mean())] * 2
+    interval = stats.t.interval(0.95, len(sample) - 1, sample.mean(), stats.sem(sample))
+    return [float(bound) for bound in interval]
+
+
+def _account(totals: Mapping[str, Tensor], scenario: Scenario) -> dict[str, Any]:
+    """How the helper flew and what each node spent, per episode; shares are of all slots."""
+    per_episode = {name: float(values.mean()) for name, values in totals.items()}
+    del per_episode["secrecy_sum_rate"]
+    return {
+        name: value / scenario.num_slots if name.endswith("_share") else value
+        for name, value in per_episode.items()
+    }
+
+
+def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
+    """Flights (episodes, T) as a table with a row per slot; lists hold one entry per UE."""
+    episodes, num_slots = flown.batch_size
+    diagnostics = flown["diagnostics"]
+    columns = {
+        "scheme": [scheme] * (episodes * num_slots),
+        "episode": np.repeat(np.arange(episodes), num_slots),
+        "slot": np.tile(np.arange(1, num_slots + 1), episodes),
+        "x": flown["position"][..., 0],
+        "y": flown["position"][..., 1],
+        "relay": flown["mode"] == 1,
+        "off_map": flown["off_map"],
+        "secrecy_sum_rate": secrecy_sum_rate(flown),
+        "relay_sum_rate": diagnostics["relay_sum_rate"],
+        "jamming_sum_rate": diagnostics["jamming_sum_rate"],
+        "edge_energy": diagnostics["edge_energy"],
+        "helper_energy": diagnostics["helper_energy"],
+        "budget_violation": diagnostics["budget_violation"],
+    }
+    table = pd.DataFrame(
+        {
+            name: values.flatten().numpy() if isinstance(values, Tensor) else values
+            for name, values in columns.items()
+        }
+    )
+    for name in ("offloading", "secrecy_rate", "ue_energy"):
+        table[name] = diagnostics[name].flatten(0, 1).tolist()
+    return table

@@ -1,0 +1,46 @@
+"""What an evaluation found, as a table for the terminal."""
+
+from rich.console import Console
+
+from hyuav._support.errors import harmless
+from hyuav._support.terminal import print_table, results_table
+from hyuav.experiments.evaluation import LABELS, Evaluation
+
+
+def print_results(evaluation: Evaluation, console: Console) -> None:
+    """Print the evaluation as a table that fits 80 columns."""
+    summary = evaluation.summary
+    title = (
+        f"{harmless(summary['scenario'])}, T = {summary['num_slots']}: mean of "
+        f"{summary['episodes']} episodes on the same fading, 95 % interval"
+    )
+    table = results_table(
+        title,
+        "Scheme",
+        "Secrecy sum-rate\n(bps/Hz)",
+        "own\noptimum",
+        "hybrid\noptimum",
+        "relay\nslots",
+        "UEs off-\nloading",
+        "off\nmap",
+    )
+    for scheme, result in summary["schemes"].items():
+        rate = result["secrecy_sum_rate"]
+        table.add_row(
+            LABELS[scheme],
+            "{:.2f} [{:.2f}, {:.2f}]".format(rate["mean"], *rate["ci95"]),
+            _percent(result.get("fraction_of_optimum")),
+            _percent(result.get("fraction_of_hybrid_optimum")),
+            _percent(result["relay_share"]),
+            _percent(result["offloading_share"]),
+            f"{result['off_map']:.1f}",
+        )
+    print_table(table, console)
+    for scheme, result in summary["schemes"].items():
+        if result["budget_violations"] > 0:
+            count = f"{result['budget_violations']:.2f}"
+            console.print(f"{LABELS[scheme]}: {count} energy budgets exceeded per episode")
+
+
+def _percent(fraction: float | None) -> str:
+    return "-" if fraction is None else f"{100 * fraction:.1f} %"

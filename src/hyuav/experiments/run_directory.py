@@ -1,0 +1,309 @@
+"""The run directory: configuration, metrics, checkpoints, evaluation and figures of a training."""
+
+import dataclasses
+import fcntl
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from omegaconf import OmegaConf
+from torch import Tensor
+
+from hyuav._support.durable import create_durably
+from hyuav._support.errors import BusyError, InputError, rejection, require_choice
+from hyuav._support.files import open_regular, read_regular
+from hyuav._support.parameters import mapping, read_yaml, sequence
+from hyuav.experiments.metrics import IDENTITY, parse_rows
+from hyuav.learning.algorithm import AlgorithmParameters
+from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
+from hyuav.learning.cohort import Learner
+from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.training import TrainingParameters
+from hyuav.physics.scenario import PRESETS, Scenario
+from hyuav.physics.slot import SCHEMES
+
+REPORT_FILE = "report.html"
+
+METRIC_COLUMNS = (
+    "episode",
+    "slots",
+    "learner",
+    "scheme",
+    "seed",
+    "num_slots",
+    "accumulated_reward",
+    "evaluation",
+    "sum_rate",
+    "best_evaluation",
+    "seconds",
+)
+"""Columns of ``metrics.csv``; the mean loss of each gradient step follows.
+
+``evaluation`` is noise-free, ``sum_rate`` the same without the off-map penalty.
+"""
+
+METRIC_NUMBERS = frozenset(METRIC_COLUMNS) - {"scheme"}
+"""Those of them that hold numbers."""
+
+
+@dataclass(frozen=True)
+class RunConfiguration:
+    """What a training was asked to do: enough to build it again."""
+
+    scenario_name: str
+    scenario: Scenario
+    learners: tuple[Learner, ...]
+    algorithm_name: str
+    algorithm: AlgorithmParameters
+    training: TrainingParameters
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "RunConfiguration":
+        """Read what :meth:`to_dict` gives.
+
+        Raises:
+            InputError: a missing or unacceptable entry.
+        """
+        for name in ("scenario", "learners", "algorithm", "training"):
+            if name not in values:
+                raise InputError(f"configuration: {name} is missing")
+        scenario_name, scenario = named_scenario(values["scenario"])
+        algorithm_name, algorithm = named_algorithm(values["algorithm"])
+        return cls(
+            scenario_name,
+            scenario,
+            _learners(values["learners"], scenario.num_slots),
+            algorithm_name,
+            algorithm,
+            TrainingParameters.from_dict(mapping("training", values["training"])),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as they stand in ``config.yaml``."""
+        return {
+            "scenario": {"name": self.scenario_name, **self.scenario.to_dict()},
+            "learners": [learner.to_dict() for learner in self.learners],
+            "algorithm": {"name": self.algorithm_name, **self.algorithm.to_dict()},
+            "training": self.training.to_dict(),
+        }
+
+
+def _learner(name: str, value: object) -> Learner:
+    if isinstance(value, Learner):
+        return value
+    fields = mapping(name, value)
+    try:
+        return Learner.from_dict(fields)
+    except InputError as error:
+        raise type(error)(f"{name}: {error}") from None
+
+
+def _learners(values: object, num_slots: int) -> tuple[Learner, ...]:
+    """Learners that differ, where those without a horizon of their own have ``num_slots``."""
+    learners: tuple[Learner, ...] = sequence(_learner, "a list of learners")("learners", values)
+    resolved = [
+        dataclasses.replace(learner, num_slots=learner.num_slots or num_slots)
+        for learner in learners
+    ]
+    twice = [learner for learner, times in Counter(resolved).items() if times > 1]
+    if twice:
+        accepted = "learners that differ in scheme, seed or num_slots"
+        raise InputError(rejection("learners", twice[0].to_dict(), accepted))
+    return learners
+
+
+def require_writable(name: str, directory: Path) -> None:
+    """Accept a directory that can be written to; make it where there is none.
+
+    Raises:
+        InputError: it cannot be made or written to.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=directory):
+            pass
+    except OSError as error:
+        accepted = f"a writable place ({error.strerror})"
+        raise InputError(rejection(name, str(directory), accepted)) from None
+
+
+def named_scenario(values: object) -> tuple[str, Scenario]:
+    """A scenario and its name, from a preset's name or from the fields with a ``name``."""
+    if isinstance(values, str):
+        return values, Scenario.preset(values)
+    fields = mapping("scenario", values)
+    name = str(fields.pop("name", "custom"))
+    if "ue_positions" not in fields and name in PRESETS:
+        fields["ue_positions"] = PRESETS[name]
+    return name, Scenario.from_dict(fields)
+
+
+def named_algorithm(values: object) -> tuple[str, AlgorithmParameters]:
+    """An algorithm and its name, from its hyperparameters with a ``name``."""
+    fields = mapping("algorithm", values)
+    name = fields.pop("name", None)
+    require_choice("algorithm", name, ALGORITHMS)
+    return str(name), ALGORITHMS[str(name)].from_dict(fields)
+
+
+class RunDirectory:
+    """The files of one training.
+
+    ``config.yaml``, ``metrics.csv`` (a row per episode and learner), ``checkpoints/last.pt`` (all
+    that evolves), ``checkpoints/previous.pt`` (the same a little earlier),
+    ``checkpoints/best.pt`` (the best weights so far), ``evaluation.json``, ``flights.parquet``
+    and ``figures/``.
+
+    Args:
+        path: of the directory.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.config_file = self.path / "config.yaml"
+        self.metrics_file = self.path / "metrics.csv"
+        self.last_checkpoint = self.path / "checkpoints" / "last.pt"
+        self.previous_checkpoint = self.path / "checkpoints" / "previous.pt"
+        self.best_checkpoint = self.path / "checkpoints" / "best.pt"
+        self.figures = self.path / "figures"
+
+    @classmethod
+    def create(
+        cls,
+        path: str | Path,
+        configuration: RunConfiguration,
+        request: Mapping[str, Any] | None = None,
+        first_checkpoint: dict[str, Any] | None = None,
+    ) -> "RunDirectory":
+        """Begin a run directory; it is one as soon as there is a ``config.yaml``.
+
+        Args:
+            path: of the directory.
+            configuration: of the training.
+            request: all that was asked for beside it, kept in ``config.yaml`` too.
+            first_checkpoint: that a training can begin with.
+
+        Raises:
+            InputError: another training's files are there, or the place cannot be written to.
+        """
+        run = cls(path)
+        require_writable("run directory", run.figures)
+        content = OmegaConf.to_yaml({**(request or {}), **configuration.to_dict()})
+        try:
+            if first_checkpoint is not None and not run.exists:
+                save_checkpoint(run.last_checkpoint, "training", first_checkpoint)
+            create_durably(run.config_file, content.encode())
+        except FileExistsError:
+            accepted = "one without a run in it"
+            raise InputError(rejection("run directory", str(path), accepted)) from None
+        except OSError as error:
+            accepted = f"a writable place ({error.strerror})"
+            raise InputError(rejection("run directory", str(path), accepted)) from None
+        return run
+
+    @property
+    def exists(self) -> bool:
+        """Whether a training has begun here."""
+        return self.config_file.exists()
+
+    @contextmanager
+    def reserved(self) -> Iterator[None]:
+        """Let no other process train here meanwhile; a process that is killed reserves nothing.
+
+        Where the file system cannot lock a directory, nobody is kept away.
+
+        Raises:
+            BusyError: another process trains here.
+        """
+        self.path.mkdir(parents=True, exist_ok=True)
+        directory = os.open(self.path, os.O_RDONLY)
+        try:
+            fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(directory)
+            accepted = "one in which no other process trains"
+            raise BusyError(rejection("run directory", str(self.path), accepted)) from None
+        except OSError:
+            pass
+        try:
+            yield
+        finally:
+            os.close(directory)
+
+    def configuration(self) -> RunConfiguration:
+        """What the training was asked to do.
+
+        Raises:
+            InputError: there is no run here, or its ``config.yaml`` is not one.
+        """
+        return RunConfiguration.from_dict(self.request())
+
+    def request(self) -> dict[str, Any]:
+        """All that was asked for, in plain values.
+
+        Raises:
+            InputError: there is no run here.
+        """
+        try:
+            return read_yaml(self.config_file)
+        except InputError as error:
+            accepted = f"a run directory with a config.yaml ({error})"
+            raise InputError(rejection("run", str(self.path), accepted)) from None
+
+    def best_weights(self) -> dict[str, Tensor]:
+        """The best weights so far of all learners.
+
+        Raises:
+            InputError: there is no such checkpoint, or it is truncated or foreign.
+        """
+        return load_weights_file(self.best_checkpoint)
+
+    def metrics(self) -> pd.DataFrame:
+        """What training brought, a row per episode and learner.
+
+        Raises:
+            InputError: there is no such table, or it is damaged.
+        """
+        try:
+            with open_regular(self.metrics_file) as file:
+                metrics = pd.read_csv(file)
+            whole = set(METRIC_COLUMNS) <= set(metrics.columns) and (
+                metrics.empty
+                or (
+                    set(metrics.select_dtypes("number")) >= METRIC_NUMBERS  # truth values are none
+                    and metrics["scheme"].isin(SCHEMES).all()
+                )
+            )
+            reason = "" if whole else "damaged"
+        except (OSError, ValueError) as error:
+            reason = (error.strerror if isinstance(error, OSError) else "") or "damaged"
+        if reason:
+            accepted = f"the table that a training writes ({reason})"
+            raise InputError(rejection("metrics", str(self.metrics_file), accepted))
+        return metrics
+
+
+def readable_metrics(path: str | Path) -> pd.DataFrame:
+    """What can be read of a ``metrics.csv``, also while it is being written.
+
+    A file that is missing or empty has no rows; a row cut off in the middle, or damaged, is left
+    out. Every column of :data:`METRIC_COLUMNS` is there, all finite or NaN but ``scheme``.
+
+    Args:
+        path: of the file.
+    """
+    try:
+        content = read_regular(Path(path))
+    except OSError:
+        content = b""
+    header, _, lines = content[: content.rfind(b"\n") + 1].partition(b"\n")
+    columns = header.decode("utf-8", "replace").strip().split(",")
+    told = set(IDENTITY) <= set(columns)
+    rows = parse_rows(lines, columns) if told else parse_rows(b"", METRIC_COLUMNS)
+    return rows.reindex(columns=list(dict.fromkeys([*METRIC_COLUMNS, *rows.columns])))

@@ -1,0 +1,176 @@
+"""What Weights & Biases gets of an evaluation and of a comparison: tables, figures, lineage."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import wandb
+from rich.console import Console
+
+from hyuav.experiments.evaluation import LABELS, Evaluation
+from hyuav.experiments.run_directory import REPORT_FILE, RunDirectory
+from hyuav.experiments.tracking.parameters import AS_TRAINED, LONGEST, LoggerParameters
+from hyuav.experiments.tracking.session import Session, model_name, remembered
+
+
+def log_evaluation(
+    directory: Path,
+    evaluation: Evaluation,
+    runs: Sequence[RunDirectory],
+    logger: LoggerParameters,
+    console: Console,
+) -> None:
+    """Log an evaluation as a run of its own, beside those of the trainings that it evaluates.
+
+    The table of the schemes, the flights, the figures and the report of the directory are its
+    media. It uses the trainings' best checkpoints: online as artifacts; offline, where the library
+    cannot, by their names in its configuration.
+
+    Args:
+        directory: of the evaluation.
+        evaluation: to log.
+        runs: of the trainings.
+        logger: which W&B run. The mode "as_trained" is that of the first training's W&B run, and
+            nothing is logged where it has none.
+        console: on which the end is told.
+    """
+    trained = [known for known in (remembered(run.path) for run in runs) if known]
+    logger = _beside(logger, trained[0] if trained else {})
+    models = [f"{_project(known)}/{model_name(known['id'])}:best" for known in trained]
+    summary = evaluation.summary
+    config = {
+        "scenario": {"name": summary["scenario"], **summary["parameters"]},
+        "evaluation": {name: summary[name] for name in ("num_slots", "episodes", "seed")},
+        "models": models,
+    }
+    with Session(directory, logger, config, "evaluate", console=console) as session:
+        for model in models:
+            session.use_model(model)
+        session.attempt(lambda run: run.summary.update(_results(summary["schemes"])))
+        session.attempt(
+            lambda run: run.log(
+                {
+                    "schemes": wandb.Table(dataframe=_scheme_table(summary["schemes"])),
+                    "flights": wandb.Table(dataframe=evaluation.flights.astype(object)),
+                    **_media(directory),
+                }
+            )
+        )
+
+
+def log_comparison(
+    directory: Path,
+    tables: Mapping[str, pd.DataFrame],
+    config: Mapping[str, Any],
+    logger: LoggerParameters,
+    console: Console,
+) -> None:
+    """Log what a comparison has found so far, in the group of its trainings.
+
+    Args:
+        directory: of the comparison.
+        tables: of its learners by name; the interquartile means of ``algorithms`` are its summary.
+        config: all that was asked for.
+        logger: which W&B run.
+        console: on which the end is told.
+    """
+    logger = in_group(logger, directory)
+    with Session(
+        directory, logger, config, "comparison", console=console, memory=directory
+    ) as session:
+        session.attempt(
+            lambda run: run.summary.update(
+                {
+                    f"{row['algorithm']}/iqm": row["iqm"]
+                    for _, row in tables["algorithms"].iterrows()
+                }
+            )
+        )
+        session.attempt(
+            lambda run: run.log(
+                {
+                    **{
+                        name: wandb.Table(dataframe=own) for name, own in tables.items() if len(own)
+                    },
+                    **_media(directory),
+                }
+            )
+        )
+
+
+def in_group(logger: LoggerParameters, directory: Path) -> LoggerParameters:
+    """The same, in the group that is called as the directory where the logger names none."""
+    group = logger.group or directory.resolve().name[-LONGEST:]
+    return dataclasses.replace(logger, group=group)
+
+
+def part_of(logger: LoggerParameters, job: Path, directory: Path) -> LoggerParameters:
+    """The same for a training or an evaluation that a job keeps in a directory.
+
+    Args:
+        logger: of the whole job. An id that it asks for is that of the run in the job's directory.
+        job: directory of the job, which its group is called as.
+        directory: the job's or one within, which stands behind the job's in the name.
+    """
+    within = directory.resolve().relative_to(job.resolve())
+    name = Path(logger.name or job.resolve().name, within).as_posix()
+    of_job = in_group(logger, job)
+    own_id = None if within.parts else logger.id
+    return dataclasses.replace(of_job, name=name[-LONGEST:], id=own_id)
+
+
+def _beside(logger: LoggerParameters, training: Mapping[str, Any]) -> LoggerParameters:
+    """The training's mode, project, entity and group, where others are not asked for."""
+    known = {name: getattr(logger, name) or training.get(name) for name in ("entity", "group")}
+    if logger.mode == AS_TRAINED:
+        known["mode"] = training.get("mode", "disabled")
+        known["project"] = training.get("project", logger.project)
+    return LoggerParameters.from_dict({**logger.to_dict(), **known})
+
+
+def _project(training: Mapping[str, Any]) -> str:
+    entity, project = training.get("entity"), training["project"]
+    return f"{entity}/{project}" if entity else str(project)
+
+
+def _scheme_table(schemes: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """A row per scheme, as the terminal shows them."""
+    rows = []
+    for scheme, result in schemes.items():
+        rate = result["secrecy_sum_rate"]
+        own = {
+            "scheme": LABELS[scheme],
+            "secrecy_sum_rate": rate["mean"],
+            "low": rate["ci95"][0],
+            "high": rate["ci95"][1],
+        }
+        rows.append(own | {name: value for name, value in result.items() if name not in own})
+    return pd.DataFrame(rows)
+
+
+def _results(schemes: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+    """Each scheme's mean secrecy sum-rate in bps/Hz and its fraction of the optimum."""
+    values = {
+        f"{scheme}/{name}": value
+        for scheme, result in schemes.items()
+        for name, value in (
+            ("secrecy_sum_rate", result["secrecy_sum_rate"]["mean"]),
+            ("fraction_of_optimum", result.get("fraction_of_optimum", math.nan)),
+        )
+    }
+    return {name: value for name, value in values.items() if math.isfinite(value)}
+
+
+def _media(directory: Path) -> dict[str, Any]:
+    """The figures and the report that lie in a directory."""
+    media: dict[str, Any] = {
+        f"figures/{file.stem}": wandb.Image(str(file))
+        for file in sorted((directory / "figures").glob("*.png"))
+    }
+    report = directory / REPORT_FILE
+    if report.is_file():
+        media["report"] = wandb.Html(report.read_text(encoding="utf-8"), inject=False)
+    return media

@@ -1,0 +1,1 @@
+"""The planner of the robust variants, a plug-in of the training loop."""

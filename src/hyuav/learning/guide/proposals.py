@@ -1,0 +1,89 @@
+"""Flights that were never flown, to be judged by what was learned of places."""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from hyuav.envs.transforms import WITHIN
+from hyuav.learning.exploration import EVENLY, destinations
+from hyuav.learning.guide.demonstrations import BestFlights
+from hyuav.physics.slot import SecureOffloadingSystem
+
+FINEST = 40.0
+"""A variation's smallest typical displacement is this part of what is flown in a slot."""
+
+
+class Imagination:
+    """Flights to places all over the map, and variations of good ones.
+
+    How the helper flies is known, and what a place earns is what a learner holds after all that it
+    has seen; so flights can be judged before they are flown, as in Dyna (Sutton, "Integrated
+    architectures for learning, planning, and reacting", ICML 1990). What was judged too well is
+    found out by flying it. From episode to episode the places fill the map evenly; a variation
+    displaces some slots in a row of a flight, by metres or by as far as can be flown in a slot.
+
+    Args:
+        flights: D, straight ones, and as many variations.
+        system: that is flown.
+        schemes: of the N learners.
+    """
+
+    def __init__(
+        self, flights: int, system: SecureOffloadingSystem, schemes: Sequence[str]
+    ) -> None:
+        self._system = system
+        self._places = torch.arange(flights, dtype=torch.float64, device=system.device)
+        limit = system.norm_limit(schemes)
+        self._norm_limit = None if limit is None else limit.unsqueeze(1)
+        self._learners = len(schemes)
+        self.normals = (flights, 5)
+        """Shape of the standard normal numbers that make the variations of one learner."""
+        scenario = system.scenario
+        self._half_side = scenario.map_side / 2
+        self._reach = scenario.max_speed * scenario.slot_duration / self._half_side
+
+    def fly(self, episode: int, flights: BestFlights, normals: Tensor) -> tuple[Tensor, Tensor]:
+        """The flights of an episode; the first variation is the best flight itself.
+
+        Args:
+            episode: in which straight flights lead to other places than in those before.
+            flights: which are varied, the best and the one that was tried last.
+            normals: (N, D, 5), standard normal.
+
+        Returns:
+            the actions (T, N, 2 D, 2), and where they lead, in units of half the map's side.
+        """
+        towards = torch.cat([self._straight(episode), self._variations(flights, normals)], dim=2)
+        position = self._system.helper_start.expand(*towards.shape[1:])
+        actions, way = [], []
+        for target in towards:
+            action = ((target - position / self._half_side) / self._reach).clamp(-1.0, 1.0)
+            position = self._system.move(position, action, self._norm_limit).position
+            actions.append(action)
+            way.append(position / self._half_side)
+        return torch.stack(actions), torch.stack(way)
+
+    def _straight(self, episode: int) -> Tensor:
+        """Where to fly in each slot: (T, N, D, 2)."""
+        places = self._places + len(self._places) * episode
+        share = torch.stack([torch.frac(places * multiple) for multiple in EVENLY], dim=-1)
+        ends = destinations(share.to(self._system.dtype)) * WITHIN
+        return ends.expand(self._system.scenario.num_slots, self._learners, *ends.shape)
+
+    def _variations(self, flights: BestFlights, normals: Tensor) -> Tensor:
+        """The same of variations."""
+        varied = len(self._places)
+        half = varied - varied // 2
+        of_best = flights.way.unsqueeze(2).expand(-1, -1, half, -1)
+        of_tried = flights.tried_way.unsqueeze(2).expand(-1, -1, varied // 2, -1)
+        begin, length, fineness = torch.special.ndtr(normals[..., :3]).unbind(dim=-1)
+        num_slots = len(flights.way)
+        slots = torch.arange(num_slots, device=normals.device).reshape(-1, 1, 1)
+        first = (num_slots * (2.0 * begin - 1.0)).floor()  # below 0: from the beginning on
+        displaced = (slots >= first) & (slots <= first.clamp(min=0.0) + num_slots * length)
+        size = self._reach * FINEST**-fineness
+        size[:, 0] = 0.0
+        displacement = displaced.unsqueeze(-1) * (size.unsqueeze(-1) * normals[..., 3:])
+        way = torch.cat([of_best, of_tried], dim=2) + displacement
+        return way.nan_to_num(0.0).clamp(-WITHIN, WITHIN)

@@ -1,0 +1,123 @@
+"""What flights are expected to earn, by all that a learner remembers, and how sure that is."""
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor, nn
+
+from hyuav.learning.guide.control_variate import HIDDEN_SIZES, ControlVariate
+
+MANY_UES = 50
+"""Up to which each has features of its own; their products are summed over the whole memory."""
+
+POLYNOMIAL = 6
+"""Terms of a square polynomial of the position."""
+
+CAUTION = 3.0
+"""By which the posterior is widened: it does not know what the features cannot show."""
+
+ROUNDING = 1e-6
+"""Of the features' mean square sum, what the noise counts at least, so that the equations can be
+solved where rewards are almost without noise."""
+
+
+class Expectation(nn.Module):
+    """Bayesian linear regression of the fair rewards of all slots that are remembered.
+
+    A control variate's network follows its mini-batches, and jitters by more than good flights
+    differ. So its last layer is solved anew for the whole memory, on the features that it has
+    learned, as by Riquelme et al., "Deep Bayesian bandits showdown", ICLR 2018. Beside these stand,
+    for each UE, the terms of a square polynomial of the helper's position, which count where the
+    helper covers it: the secrecy sum-rate is a sum over UEs (eq. 6) and coverage a step (eq. 5),
+    which a network blurs, so that a sliver that many circles share is not seen.
+
+    The weights' posterior is Gaussian. One draw from it is one guess of what all flights earn; to
+    try the flight that a guess holds best is Thompson sampling (Russo et al., "A tutorial on
+    Thompson sampling", 2018): it tries what may be better than the best that is known, and stops
+    where that has become unlikely.
+
+    Args:
+        learners: N.
+        variate: of the N learners, whose weights are used and not changed.
+        reward_scale: of the rewards that are stored, against bps/Hz.
+    """
+
+    mean: Tensor
+    """(N, F, 1) of the posterior, in bps/Hz per feature."""
+    guess: Tensor
+    """(N, F, 1), a draw from it."""
+    noise: Tensor
+    """(N, 1, 1), variance of what the regression leaves unexplained, in (bps/Hz) squared."""
+
+    def __init__(self, learners: int, variate: ControlVariate, reward_scale: float) -> None:
+        super().__init__()
+        self.variate, self._scale = variate, reward_scale
+        num_ues = variate.afterstate.num_ues
+        self._of_each_ue = num_ues <= MANY_UES
+        self.size = HIDDEN_SIZES[-1] + 1 + POLYNOMIAL * num_ues * self._of_each_ue
+        self.register_buffer("mean", torch.zeros(learners, self.size, 1))
+        self.register_buffer("guess", torch.zeros(learners, self.size, 1))
+        self.register_buffer("noise", torch.ones(learners, 1, 1))
+
+    def features(self, place: Tensor, clock: Tensor) -> Tensor:
+        """What rewards are regressed on: (N, ..., F).
+
+        Args:
+            place: (N, ..., 2) in units of half the map's side.
+            clock: (N, ..., 1), what the clock shows there.
+        """
+        observed = self.variate.afterstate.at(place, clock)
+        hidden = self.variate.network.hidden(observed)
+        features = [hidden, torch.ones_like(clock)]
+        if self._of_each_ue:
+            x, y = place.split(1, dim=-1)
+            terms = torch.cat([torch.ones_like(x), x, y, x * x, x * y, y * y], dim=-1)
+            covered = self.variate.afterstate.coverage(observed) > 0.5
+            features.append((covered.unsqueeze(-1) * terms.unsqueeze(-2)).flatten(-2))
+        return torch.cat(features, dim=-1)
+
+    @torch.no_grad()
+    def update(self, memory: TensorDictBase, normals: Tensor) -> None:
+        """Learn from all that is remembered, and make another guess.
+
+        Args:
+            memory: (n, N) transitions as they are stored, with their fading.
+            normals: (N, F), standard normal, which decide on the guess.
+        """
+        memory = memory.transpose(0, 1)
+        following = memory["next", "observation"]
+        features = self.features(following[..., :2], following[..., -1:])
+        luck = self.variate.luck(memory)
+        fair = (memory["next", "reward"] - luck) / self._scale
+        transposed = features.transpose(1, 2)
+        products = torch.bmm(transposed, features).double()
+        diagonal = products.diagonal(dim1=1, dim2=2)
+        rounding = ROUNDING * diagonal.mean(dim=1).reshape(-1, 1, 1)
+        prior = self.noise.double().maximum(rounding)
+        equations = products + prior * torch.eye(self.size, device=products.device)
+        root, failed = torch.linalg.cholesky_ex(equations)
+        mean = torch.cholesky_solve(torch.bmm(transposed, fair).double(), root)
+        deviation = torch.linalg.solve_triangular(
+            root.transpose(1, 2), normals.double().unsqueeze(-1), upper=True
+        )
+        guess = mean + CAUTION * self.noise.double().sqrt() * deviation
+        rest = (fair - torch.bmm(features, mean.float())).square().mean(dim=1, keepdim=True)
+        solved = (failed == 0).reshape(-1, 1, 1) & rest.isfinite()
+        for kept, found in ((self.mean, mean), (self.guess, guess), (self.noise, rest)):
+            kept.copy_(torch.where(solved, found.to(kept.dtype), kept))
+
+    @torch.no_grad()
+    def of(self, way: Tensor) -> tuple[Tensor, Tensor]:
+        """What is to be expected of flights and what the last guess holds: (N, ...) bps/Hz each.
+
+        Args:
+            way: (T, N, ..., 2), where they lead, in units of half the map's side.
+        """
+        slots = torch.arange(1, len(way) + 1, device=way.device).to(way.dtype)
+        clock = (slots * (2.0 / len(way)) - 1.0).reshape(-1, *[1] * (way.ndim - 1))
+        clock = clock.expand(*way.shape[:-1], 1)
+        features = self.features(way.transpose(0, 1), clock.transpose(0, 1)).sum(dim=1)
+        weights = torch.cat([self.mean, self.guess], dim=-1)
+        flights = features.reshape(len(features), -1, self.size)
+        both = torch.bmm(flights, weights).reshape(*features.shape[:-1], 2)
+        expected, guessed = both.unbind(dim=-1)
+        return expected, guessed

@@ -1,0 +1,104 @@
+"""Random UE layouts, for studies beyond the two presets."""
+
+from collections.abc import Sequence
+
+import torch
+
+from hyuav._support.parameters import count, number, sequence
+from hyuav._support.randomness import derived_seed
+from hyuav.physics.scenario import Point
+
+_length = number(0.0)
+_point = sequence(number(), "two coordinates (x, y) in metres", length=2)
+_ues = count(1, 10**6)
+_sizes = sequence(_ues, "the numbers of UEs of one cluster or more")
+
+
+def disk(
+    num_ues: int, radius: float = 45.0, center: Point = (0.0, 0.0), *, seed: int
+) -> tuple[Point, ...]:
+    """Draw UE positions uniformly in a disk.
+
+    Args:
+        num_ues: U, at least 1.
+        radius: of the disk in metres, at least 0.
+        center: of the disk in metres.
+        seed: the same seed draws the same layout.
+
+    Returns:
+        U positions (x, y) in metres, for :attr:`Scenario.ue_positions`.
+
+    Raises:
+        InputError: ``num_ues`` below 1, ``radius`` below 0, or a value of the wrong type.
+    """
+    generator = torch.Generator().manual_seed(count(0)("seed", seed))
+    num_ues, radius = _ues("num_ues", num_ues), _length("radius", radius)
+    return _disk(num_ues, radius, _point("center", center), generator)
+
+
+def clusters(
+    sizes: Sequence[int],
+    cluster_radius: float = 15.0,
+    spread: float = 30.0,
+    center: Point = (0.0, 0.0),
+    *,
+    seed: int,
+) -> tuple[Point, ...]:
+    """Draw UE clusters: centers evenly spaced on a randomly turned circle, UEs uniform around them.
+
+    Args:
+        sizes: the number of UEs of each cluster, each at least 1.
+        cluster_radius: of each cluster in metres.
+        spread: distance of the cluster centers from ``center`` in metres.
+        center: of the layout in metres.
+        seed: the same seed draws the same layout.
+
+    Returns:
+        sum(sizes) positions (x, y) in metres, cluster by cluster.
+
+    Raises:
+        InputError: no cluster, an empty cluster, a negative length, or a value of the wrong type.
+    """
+    generator = torch.Generator().manual_seed(count(0)("seed", seed))
+    sizes, center = _sizes("sizes", sizes), _point("center", center)
+    cluster_radius = _length("cluster_radius", cluster_radius)
+    spread = _length("spread", spread)
+    turn = torch.rand((), generator=generator, dtype=torch.float64)
+    angles = 2 * torch.pi * (turn + torch.arange(len(sizes), dtype=torch.float64) / len(sizes))
+    positions: list[Point] = []
+    for size, angle in zip(sizes, angles, strict=True):
+        x = center[0] + spread * float(angle.cos())
+        y = center[1] + spread * float(angle.sin())
+        positions.extend(_disk(size, cluster_radius, (x, y), generator))
+    return tuple(positions)
+
+
+def random_layout(seed: int) -> tuple[Point, ...]:
+    """Draw one of a series of layouts of 10 UEs: even seeds draw a disk, odd ones two clusters.
+
+    The clusters' sizes are drawn too, from 3 + 7 to 7 + 3.
+
+    Args:
+        seed: the same seed draws the same layout.
+
+    Returns:
+        10 positions (x, y) in metres.
+
+    Raises:
+        InputError: ``seed`` is negative or of the wrong type.
+    """
+    seed = count(0)("seed", seed)
+    if seed % 2 == 0:
+        return disk(10, seed=seed)
+    generator = torch.Generator().manual_seed(derived_seed(seed, "cluster sizes"))
+    first = int(torch.randint(3, 8, (), generator=generator))
+    return clusters([first, 10 - first], seed=seed)
+
+
+def _disk(
+    num_ues: int, radius: float, center: Point, generator: torch.Generator
+) -> tuple[Point, ...]:
+    draws = torch.rand((num_ues, 2), generator=generator, dtype=torch.float64)
+    distance, angle = radius * draws[:, 0].sqrt(), 2 * torch.pi * draws[:, 1]
+    x, y = center[0] + distance * angle.cos(), center[1] + distance * angle.sin()
+    return tuple(zip(x.tolist(), y.tolist(), strict=True))

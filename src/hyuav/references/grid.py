@@ -1,0 +1,149 @@
+"""Backward dynamic programming over a grid of helper positions."""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+from torch import Tensor
+
+from hyuav.physics.scenario import Scenario
+
+Values = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""Relative: a grid point closer than this to a limit (map edge, speed limit) lies on it."""
+
+
+class Grid(NamedTuple):
+    """The points start + resolution (i, j) that lie on the map, its edges included."""
+
+    x: Values
+    """(X,) m."""
+    y: Values
+    """(Y,) m."""
+    start: tuple[int, int]
+    """Row and column of the helper's start."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(X, Y)."""
+        return len(self.x), len(self.y)
+
+    def positions(self) -> Tensor:
+        """All grid points, row by row: (X * Y, 2) m."""
+        axes = torch.from_numpy(self.x), torch.from_numpy(self.y)
+        return torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1).reshape(-1, 2)
+
+
+def grid_over_map(scenario: Scenario, resolution: float) -> Grid:
+    """The grid anchored at the helper's start.
+
+    Args:
+        scenario: gives the start and the map's side.
+        resolution: spacing in m.
+    """
+    half = scenario.map_side / 2
+    axes, origin = [], []
+    for coordinate in scenario.helper_start:
+        before = int((half + coordinate) / resolution * (1 + ROUNDING))
+        after = int((half - coordinate) / resolution * (1 + ROUNDING))
+        axis = coordinate + resolution * np.arange(-before, after + 1)
+        axes.append(axis.clip(-half, half))
+        origin.append(before)
+    return Grid(axes[0], axes[1], (origin[0], origin[1]))
+
+
+class Reach:
+    """The grid points that one slot of flight reaches: a box cut by a disc, as a union of boxes.
+
+    A discrete disc is the union of the boxes inscribed in it, and the largest value in a box is
+    separable into its rows and columns. The box of reading 5 alone is a union of one.
+
+    Args:
+        box: largest displacement along each axis, in grid spacings.
+        disc: largest norm of the displacement, in grid spacings; infinity for none.
+    """
+
+    def __init__(self, box: float, disc: float) -> None:
+        box, disc = box * (1 + ROUNDING), disc * (1 + ROUNDING)
+        rows = np.arange(int(min(box, disc)) + 1)
+        columns = np.sqrt(np.maximum(disc**2 - rows**2, 0.0)).clip(max=box).astype(int)
+        # Of the boxes of equal width only the tallest counts: the last row of each width.
+        last = np.append(columns[1:] < columns[:-1], True)
+        self.boxes = list(zip(rows[last].tolist(), columns[last].tolist(), strict=True))
+        offsets = np.arange(-rows[-1], rows[-1] + 1)
+        self._squared_norm = offsets[:, None] ** 2 + offsets**2
+        self._reachable = np.abs(offsets) <= columns[np.abs(offsets)][:, None]
+
+    def best(self, values: Values) -> Values:
+        """The largest value within reach of each grid point: (X, Y)."""
+        best = np.full_like(values, -np.inf)
+        for half_widths in self.boxes:
+            # A window cannot reach further than across the grid.
+            size = [2 * min(h, n - 1) + 1 for h, n in zip(half_widths, values.shape, strict=True)]
+            # Repeating the edge adds no value that the cut window does not hold already.
+            np.maximum(best, maximum_filter(values, size, mode="nearest"), out=best)
+        return best
+
+    def argbest(self, values: Values, point: tuple[int, int]) -> tuple[int, int]:
+        """The grid point with the largest value within reach of ``point``; of equals the nearest.
+
+        Args:
+            values: (X, Y).
+            point: row and column.
+        """
+        span = self._reachable.shape[0] // 2
+        low = [max(index - span, 0) for index in point]
+        grid_window = tuple(
+            slice(first, index + span + 1) for first, index in zip(low, point, strict=True)
+        )
+        window = values[grid_window]
+        own = tuple(
+            slice(first - index + span, first - index + span + length)
+            for first, index, length in zip(low, point, window.shape, strict=True)
+        )
+        window = np.where(self._reachable[own], window, -np.inf)
+        distance = np.where(window == window.max(), self._squared_norm[own], np.inf)
+        row, column = np.unravel_index(distance.argmin(), distance.shape)
+        return int(row) + low[0], int(column) + low[1]
+
+
+def values_to_go(reward: Values, reach: Reach, num_slots: int) -> list[Values]:
+    """V with 0, 1, ..., T - 1 slots to go, for every grid point.
+
+    V_n(x) = max over x' within reach of x of [reward(x') + V_{n-1}(x')] and V_0 = 0: the reward
+    has no clock, so the values of all horizons come out of one pass.
+
+    Args:
+        reward: expected reward of a slot spent at each grid point, (X, Y) bps/Hz.
+        reach: of one slot.
+        num_slots: T.
+
+    Returns:
+        T arrays (X, Y) in bps/Hz.
+    """
+    values = [np.zeros_like(reward)]
+    for _ in range(num_slots - 1):
+        values.append(reach.best(reward + values[-1]))
+    return values
+
+
+def best_flight(
+    reward: Values, values: list[Values], reach: Reach, grid: Grid, num_slots: int
+) -> Tensor:
+    """The best flight of ``num_slots`` slots from the start: (num_slots + 1, 2) m, float64.
+
+    Args:
+        reward: (X, Y) bps/Hz.
+        values: what :func:`values_to_go` gives, for at least ``num_slots`` slots.
+        reach: of one slot.
+        grid: of the positions.
+        num_slots: T, or any shorter horizon.
+    """
+    flight = [grid.start]
+    for value in reversed(values[:num_slots]):
+        flight.append(reach.argbest(reward + value, flight[-1]))
+    rows, columns = np.array(flight).T
+    return torch.from_numpy(np.stack([grid.x[rows], grid.y[columns]], axis=-1))

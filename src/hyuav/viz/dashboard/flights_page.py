@@ -1,0 +1,166 @@
+"""The page of the flights: played slot by slot, from an evaluation or flown on the spot."""
+
+import dataclasses
+from functools import lru_cache
+from pathlib import Path
+
+import pandas as pd
+import streamlit as st
+
+from hyuav._support.errors import InputError, rejection
+from hyuav._support.files import read_parquet
+from hyuav.experiments.evaluation import FLIGHTS_FILE
+from hyuav.physics.scenario import Scenario
+from hyuav.viz.dashboard.flying import checkpoint_of, flown_by, learner_label
+from hyuav.viz.dashboard.index import RunIndex, Stamp
+from hyuav.viz.dashboard.plain import plain, refusals
+from hyuav.viz.html.player import flight_player
+from hyuav.viz.html.style import scheme_label
+
+KEPT = ("flown_run", "flown_source", "flown_learner", "flown_scheme", "flown_episode")
+
+KEPT_FLIGHTS, FLOWN_NOW = "kept by its evaluation", "of its best weights, flown now"
+
+COLUMNS = {
+    *("scheme", "episode", "slot", "x", "y", "relay", "off_map", "secrecy_sum_rate"),
+    *("relay_sum_rate", "jamming_sum_rate", "edge_energy", "helper_energy", "budget_violation"),
+    *("offloading", "secrecy_rate", "ue_energy"),
+}
+"""Of the table of flights, as :func:`hyuav.experiments.evaluation.slot_table` makes it."""
+
+WIDE, NARROW = "player-wide", "player-narrow"
+"""Containers of the player, of which a page shows the one that suits its width."""
+
+_BY_WIDTH = f"""<style>
+@media (max-width: 900px) {{ .st-key-{WIDE} {{ display: none; }} }}
+@media (min-width: 901px) {{ .st-key-{NARROW} {{ display: none; }} }}
+</style>"""
+
+_LARGEST_FILE = 2**28
+"""Bytes; a few flights of each scheme take far less."""
+
+
+def show(index: RunIndex) -> None:
+    """The page."""
+    st.header("Flights", anchor=False)
+    evaluations = index.evaluations()
+    listed = [*(entry.name for entry in index.entries()), *evaluations]
+    sources = {name: _sources(index, name) for name in listed}
+    names = [name for name, kinds in sources.items() if kinds]
+    if not names:
+        st.info(
+            f"No run in {plain(index.root)} has flights or a checkpoint yet. "
+            "`python recipes/evaluate.py run=DIRECTORY` evaluates one."
+        )
+        return
+    if st.session_state.get("flown_run") not in names:
+        st.session_state["flown_run"] = next(
+            (name for name in names if KEPT_FLIGHTS in sources[name]), names[0]
+        )
+    first, second = st.columns(2)
+    run = first.selectbox(
+        "Run",
+        names,
+        format_func=lambda name: f"{name} (evaluation)" if name in evaluations else name,
+        key="flown_run",
+    )
+    if st.session_state.get("flown_source") not in sources[run]:
+        st.session_state["flown_source"] = sources[run][0]
+    source = second.selectbox("Flights", sources[run], key="flown_source")
+    with refusals():
+        kept = source == KEPT_FLIGHTS
+        scenario, flights = _evaluated(index, run) if kept else _flown_now(index, run)
+        _play(scenario, flights)
+
+
+def _sources(index: RunIndex, name: str) -> list[str]:
+    kinds = {KEPT_FLIGHTS: (FLIGHTS_FILE,), FLOWN_NOW: ("checkpoints", "best.pt")}
+    return [kind for kind, parts in kinds.items() if index.has(name, *parts)]
+
+
+def _evaluated(index: RunIndex, name: str) -> tuple[Scenario, pd.DataFrame]:
+    """The flights that a run's evaluation kept, and the scenario that was flown."""
+    path = index.file(name, FLIGHTS_FILE)
+    parameters = (index.evaluation(name) or {}).get("parameters")
+    if not isinstance(parameters, dict):
+        accepted = "a run whose evaluation.json names the scenario's parameters"
+        raise InputError(rejection("run", name, accepted))
+    state = path.stat()
+    flights = read_flights(path, (state.st_mtime_ns, state.st_size))
+    return Scenario.from_dict(parameters), flights
+
+
+@lru_cache(maxsize=8)
+def read_flights(path: Path, stamp: Stamp) -> pd.DataFrame:  # noqa: ARG001 - read anew if changed
+    """A table of flights.
+
+    Args:
+        path: of ``flights.parquet``.
+        stamp: its modification time and size.
+
+    Raises:
+        InputError: it is damaged or another program's.
+    """
+    accepted = "the flights of an evaluation"
+    if path.is_file() and path.stat().st_size > _LARGEST_FILE:
+        raise InputError(rejection("flights", str(path), f"{accepted}, in a smaller file"))
+    flights = read_parquet(path, accepted)
+    missing = COLUMNS - set(flights.columns)
+    if missing or flights.empty:
+        accepted += f" with {', '.join(sorted(missing)) or 'rows'}"
+        raise InputError(rejection("flights", str(path), accepted))
+    return flights
+
+
+def _flown_now(index: RunIndex, name: str) -> tuple[Scenario, pd.DataFrame]:
+    """Flights of a learner of the run, through fading of its own scenario."""
+    configuration = index.run(name).configuration()
+    learners = configuration.learners
+    labels = [learner_label(learner, configuration.scenario) for learner in learners]
+    if st.session_state.get("flown_learner") not in range(len(labels)):
+        st.session_state["flown_learner"] = 0
+    number = st.selectbox(
+        "Learner", range(len(labels)), format_func=labels.__getitem__, key="flown_learner"
+    )
+    learner = learners[number]
+    horizon = learner.num_slots or configuration.scenario.num_slots
+    scenario = dataclasses.replace(configuration.scenario, num_slots=horizon)
+    checkpoint = checkpoint_of(index, name, number)
+    return scenario, flown_by(scenario, learner.scheme, checkpoint).flights
+
+
+def _play(scenario: Scenario, flights: pd.DataFrame) -> None:
+    schemes = list(dict.fromkeys(flights["scheme"].astype(str)))
+    if st.session_state.get("flown_scheme") not in schemes:
+        st.session_state["flown_scheme"] = schemes[0]
+    first, second = st.columns([2, 1])
+    scheme = first.selectbox("Scheme", schemes, format_func=scheme_label, key="flown_scheme")
+    own = flights[flights["scheme"] == scheme]
+    episodes = sorted(int(episode) for episode in own["episode"].unique())
+    if st.session_state.get("flown_episode") not in episodes:
+        st.session_state["flown_episode"] = episodes[0]
+    episode = second.selectbox("Episode", episodes, key="flown_episode")
+    player(scenario, flights, scheme, episode)
+
+
+def player(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode: int) -> None:
+    """Show a flight with its slider, with its panels beside the map or, on a phone, below it.
+
+    Raises:
+        InputError: the flights are not those of this scenario.
+    """
+    try:
+        figures = {
+            name: flight_player(scenario, flights, scheme, episode, narrow=name == NARROW)
+            for name in (WIDE, NARROW)
+        }
+    except (TypeError, ValueError, KeyError, IndexError) as error:
+        if isinstance(error, InputError):
+            raise
+        accepted = "flights of this scenario, a row per slot"
+        raise InputError(rejection("flights", scheme, accepted)) from None
+    st.html(_BY_WIDTH)  # a server does not know how wide a page is
+    for name, figure in figures.items():
+        with st.container(key=name):
+            chart = f"{name}-chart"
+            st.plotly_chart(figure, theme=None, key=chart, config={"displayModeBar": False})

@@ -1,0 +1,151 @@
+"""The optimum and trained checkpoints in a scenario that a person is changing."""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+from torch import Tensor
+
+from hyuav._support.errors import InputError, rejection
+from hyuav.experiments.evaluation import OPTIMA, Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.experiments.experiment import LEARNED, learned_policy
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.learning.cohort import Learner
+from hyuav.learning.weights import count_learners
+from hyuav.physics.scenario import Scenario
+from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve
+from hyuav.viz.dashboard.index import RunIndex, Stamp
+
+MOST_SLOTS, MOST_UES = 500, 200
+"""Of a scenario that is flown while a person waits."""
+
+EPISODES = EvaluationParameters(episodes=200, flights=3)
+"""Flown of each scheme, and how many of them are shown."""
+
+COARSE_DRAWS, FINE_DRAWS = 64, 256
+"""Of the fading and the tasks, from which the optimum is found."""
+
+_COARSE_SPACINGS, _MOST_SPACINGS = 50, 400
+"""Of the grid on each side of the map."""
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A run's best weights as they were at some time, and one of their learners."""
+
+    run: str
+    """The run's directory."""
+    stamp: Stamp
+    """Of the checkpoint's file: a training may write it anew."""
+    index: int
+    """Of the learner in the run."""
+
+
+def checkpoint_of(index: RunIndex, name: str, learner: int) -> Checkpoint:
+    """The best weights that a run has now.
+
+    Raises:
+        InputError: the run has none below the index's root.
+    """
+    run = index.run(name)
+    state = run.best_checkpoint.stat()
+    return Checkpoint(str(run.path), (state.st_mtime_ns, state.st_size), learner)
+
+
+def learner_label(learner: Learner, scenario: Scenario) -> str:
+    """What tells a run's learners apart."""
+    horizon = learner.num_slots or scenario.num_slots
+    return f"{learner.scheme}, T = {horizon}, seed {learner.seed}"
+
+
+def resolution(scenario: Scenario, *, fine: bool) -> float:
+    """The grid spacing in m with which the optimum is found.
+
+    The coarse one is a whole fraction of the longest way along an axis in a slot.
+
+    Raises:
+        InputError: the helper is too slow, or the scenario too large, to be solved meanwhile.
+    """
+    _require_size(scenario)
+    way = scenario.max_speed * scenario.slot_duration
+    if way * _MOST_SPACINGS < scenario.map_side:
+        least = scenario.map_side / (_MOST_SPACINGS * scenario.slot_duration)
+        accepted = f"at least {least:.4g} m/s for the optimum on this page"
+        raise InputError(rejection("max_speed", scenario.max_speed, accepted))
+    coarse = way / math.ceil(way * _COARSE_SPACINGS / scenario.map_side)
+    return min(RESOLUTION * scenario.map_side / 200, coarse) if fine else coarse
+
+
+@lru_cache(maxsize=128)
+def optimum(scenario: Scenario, rule: str, *, fine: bool) -> Optimum:
+    """The best flight of a scheme, on the coarse grid or on the evaluation's.
+
+    Args:
+        scenario: to fly.
+        rule: who chooses the mode.
+        fine: whether to take seconds for it.
+
+    Raises:
+        InputError: as :func:`resolution`.
+    """
+    spacing = resolution(scenario, fine=fine)
+    draws = FINE_DRAWS if fine else COARSE_DRAWS
+    return solve(scenario, [rule], resolution=spacing, draws=draws, evaluation_draws=2000)[rule]
+
+
+@lru_cache(maxsize=128)
+def flown(
+    scenario: Scenario, rule: str, checkpoint: Checkpoint | None = None, *, fine: bool = False
+) -> Evaluation:
+    """Fly the optimum and, beside it, a checkpoint through the same fading.
+
+    Args:
+        scenario: to fly.
+        rule: who chooses the mode.
+        checkpoint: whose learner flies under the same rule, if any.
+        fine: of the optimum's grid.
+
+    Raises:
+        InputError: as :func:`resolution`, or the checkpoint does not fit the scenario.
+    """
+    best = optimum(scenario, rule, fine=fine)
+    policies = {OPTIMA[rule]: [Policy(FlightPolicy(best.path, scenario))]}
+    if checkpoint is not None:
+        policies[LEARNED[rule]] = [_policy(scenario, checkpoint)]
+    return evaluate(scenario, "changed", policies, EPISODES)
+
+
+@lru_cache(maxsize=64)
+def flown_by(scenario: Scenario, rule: str, checkpoint: Checkpoint) -> Evaluation:
+    """Fly a checkpoint alone, as :func:`flown` does beside the optimum."""
+    return evaluate(scenario, "own", {LEARNED[rule]: [_policy(scenario, checkpoint)]}, EPISODES)
+
+
+def _require_size(scenario: Scenario) -> None:
+    """Accept only what is flown while somebody waits."""
+    accepted = "a whole number <= {} to be flown on this page"
+    if scenario.num_slots > MOST_SLOTS:
+        raise InputError(rejection("num_slots", scenario.num_slots, accepted.format(MOST_SLOTS)))
+    if scenario.num_ues > MOST_UES:
+        raise InputError(rejection("number of UEs", scenario.num_ues, accepted.format(MOST_UES)))
+
+
+def _policy(scenario: Scenario, checkpoint: Checkpoint) -> Policy:
+    _require_size(scenario)
+    configuration, weights = _saved(checkpoint.run, checkpoint.stamp)
+    trained = configuration.scenario.num_ues
+    if scenario.num_ues != trained:
+        accepted = f"{trained}, for which the checkpoint was trained"
+        raise InputError(rejection("number of UEs", scenario.num_ues, accepted))
+    return learned_policy(scenario, configuration.algorithm, weights, [checkpoint.index])
+
+
+@lru_cache(maxsize=8)
+def _saved(run: str, stamp: Stamp) -> tuple[RunConfiguration, dict[str, Tensor]]:  # noqa: ARG001
+    """What a run keeps; the stamp has a file that was written anew read anew."""
+    directory = RunDirectory(run)
+    configuration, weights = directory.configuration(), directory.best_weights()
+    if count_learners(weights) != len(configuration.learners):
+        accepted = f"weights of {len(configuration.learners)} learners"
+        raise InputError(rejection("checkpoint", str(directory.best_checkpoint), accepted))
+    return configuration, weights

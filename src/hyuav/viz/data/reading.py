@@ -1,0 +1,93 @@
+"""Read what a directory holds, as far as it can be read: it may be unfinished or damaged."""
+
+import json
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from hyuav._support.errors import InputError
+from hyuav._support.files import read_parquet
+from hyuav._support.parameters import read_yaml
+from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, LABELS
+
+_PER_UE = {"offloading", "secrecy_rate", "ue_energy"}
+_FLIGHT_COLUMNS = {
+    *("scheme", "episode", "slot", "x", "y", "relay", "off_map", "secrecy_sum_rate"),
+    *("relay_sum_rate", "jamming_sum_rate", "edge_energy", "helper_energy"),
+    *_PER_UE,
+}
+_ACCOUNT = {"relay_share", "offloading_share", "off_map", "budget_violations"} | {
+    *("ue_energy", "edge_energy", "helper_energy")
+}
+
+
+def readable_config(directory: Path) -> dict[str, Any]:
+    """The directory's ``config.yaml``; empty where there is none that can be read."""
+    try:
+        return read_yaml(directory / "config.yaml")
+    except InputError:
+        return {}
+
+
+def readable_evaluation(directory: Path) -> dict[str, Any] | None:
+    """The content of ``evaluation.json``; None where there is none that can be read."""
+    if not (directory / EVALUATION_FILE).is_file():  # a pipe would be waited for
+        return None
+    try:
+        content = json.loads((directory / EVALUATION_FILE).read_text(encoding="utf-8"))
+        complete = all(_is_account(account) for account in content["schemes"].values())
+        whole = all(type(content[name]) is int for name in ("num_slots", "episodes"))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+    return content if complete and whole else None
+
+
+def _is_account(account: dict[str, Any]) -> bool:
+    if type(account["learners"]) is not int:
+        return False
+    rate = account["secrecy_sum_rate"]
+    low, high = rate["ci95"]
+    needed = [rate["mean"], low, high, *(account[name] for name in _ACCOUNT)]
+    optional = [account.get(f"fraction_of_{name}", 0.0) for name in ("optimum", "hybrid_optimum")]
+    return all(
+        isinstance(value, int | float) and abs(value) <= sys.float_info.max
+        for value in needed + optional
+    )
+
+
+def readable_flights(directory: Path) -> pd.DataFrame | None:
+    """The rows of ``flights.parquet``; None where there are none that can be read."""
+    table = readable_table(directory / FLIGHTS_FILE, _FLIGHT_COLUMNS)
+    return table if table is not None and _is_flown(table) else None
+
+
+def _is_flown(table: pd.DataFrame) -> bool:
+    """Whether all that is drawn of flights are finite numbers, a list of them for the UEs."""
+    numbers = sorted(_FLIGHT_COLUMNS - _PER_UE - {"scheme"})
+    try:
+        drawn = [table[numbers].to_numpy(float).ravel()]
+        drawn += [np.asarray(own, dtype=float) for name in _PER_UE for own in table[name]]
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return all(own.ndim == 1 and np.isfinite(own).all() for own in drawn)
+
+
+def is_drawable(flights: pd.DataFrame, num_ues: int) -> bool:
+    """Whether flights are of known schemes, some at least, and tell of so many UEs."""
+    known = [isinstance(scheme, str) and scheme in LABELS for scheme in flights["scheme"]]
+    return any(known) and all(len(own) == num_ues for name in _PER_UE for own in flights[name])
+
+
+def readable_table(path: Path, columns: Iterable[str]) -> pd.DataFrame | None:
+    """A Parquet file with at least these columns; None where it is none, yet, or has no rows."""
+    if not path.is_file():
+        return None
+    try:
+        table = read_parquet(path, "a table")
+    except InputError:
+        return None
+    return table if len(table) and set(columns) <= set(table.columns) else None

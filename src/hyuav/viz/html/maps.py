@@ -1,0 +1,116 @@
+"""Maps of the secrecy sum-rate over the helper's positions, as Plotly figures."""
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from hyuav.envs.rendering import EAVESDROPPER_COLOR, LEGITIMATE_COLOR
+from hyuav.physics.scenario import Scenario
+from hyuav.viz.data.maps import Mode, sum_rates_over_map
+from hyuav.viz.html.style import axis, base_layout, translucent
+
+HEIGHT = 480
+"""Of the figure in pixels."""
+
+TITLES: dict[Mode, str] = {"relay": "Relay", "jamming": "Jamming", "better": "Better mode"}
+
+
+def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 2.0) -> go.Figure:
+    """The secrecy sum-rate at every helper position, without fading.
+
+    The scale is the same in every mode. On the map of the better mode, a white line goes around
+    where relaying is better, and a dashed one around where jamming is: where both regions meet,
+    the solid one lies above.
+
+    Args:
+        scenario: whose map is drawn.
+        mode: of the helper.
+        resolution: of the map in m.
+    """
+    rates = sum_rates_over_map(scenario, resolution)
+    shown = rates.of(mode).astype(np.float32)
+    figure = go.Figure(layout=base_layout())
+    figure.add_heatmap(
+        x=rates.axis,
+        y=rates.axis,
+        z=shown,
+        zmin=0.0,
+        zmax=max(float(rates.better.max()), 1e-6),
+        colorscale="Viridis",
+        colorbar={
+            "title": {"text": "Secrecy sum-rate (bps/Hz)", "side": "bottom"},
+            "orientation": "h",
+            "thickness": 12,
+            "y": -0.16,
+            "yanchor": "top",
+        },
+        hovertemplate="helper at (%{x:.0f}, %{y:.0f}) m: %{z:.2f} bps/Hz<extra></extra>",
+    )
+    if mode == "better":
+        _outline(figure, rates.axis, rates.jamming > rates.relay, "dash")
+        _outline(figure, rates.axis, rates.relay > rates.jamming, "solid")
+    _add_nodes(figure, scenario)
+    half = scenario.map_side / 2
+    square = {"range": [-half, half], "constrain": "domain", "nticks": 6, "mirror": True}
+    figure.update_layout(
+        title={"text": TITLES[mode], "x": 0.5, "xanchor": "center", "font": {"size": 14}},
+        height=HEIGHT,
+        margin={"l": 50, "r": 15, "t": 35, "b": 125},
+        showlegend=False,
+        xaxis=axis("x (m)", **square),
+        yaxis=axis("y (m)", **square, scaleanchor="x", scaleratio=1),
+    )
+    return figure
+
+
+def _outline(
+    figure: go.Figure, axis: NDArray[np.float64], region: NDArray[np.bool_], dash: str
+) -> None:
+    """A line around a region of the map; nothing where there is none."""
+    if region.any():
+        figure.add_contour(
+            x=axis,
+            y=axis,
+            z=region.astype(np.float32),
+            contours={"start": 0.5, "end": 0.5, "size": 1, "coloring": "none"},
+            line={"color": "white", "width": 1.5, "dash": dash},
+            showscale=False,
+            hoverinfo="skip",
+        )
+
+
+def _add_nodes(figure: go.Figure, scenario: Scenario) -> None:
+    x, y = zip(*scenario.ue_positions, strict=True)
+    (left, bottom), radius = scenario.legitimate_position, scenario.coverage_radius
+    figure.add_shape(
+        type="circle",
+        x0=left - radius,
+        x1=left + radius,
+        y0=bottom - radius,
+        y1=bottom + radius,
+        line={"color": translucent("#FFFFFF", 0.8), "width": 1, "dash": "dot"},
+    )
+    nodes = (
+        ("UE", x, y, {"size": 6, "color": "#000000"}),
+        ("legitimate UAV (L)", *_at(scenario.legitimate_position, "square", LEGITIMATE_COLOR)),
+        (
+            "eavesdropper (E)",
+            *_at(scenario.eavesdropper_position, "triangle-down", EAVESDROPPER_COLOR),
+        ),
+    )
+    for name, across, up, marker in nodes:
+        figure.add_scatter(
+            x=list(across),
+            y=list(up),
+            name=name,
+            mode="markers",
+            marker={"line": {"color": "white", "width": 1}} | marker,
+            hovertemplate=f"{name}<br>(%{{x:.0f}}, %{{y:.0f}}) m<extra></extra>",
+            cliponaxis=False,
+        )
+
+
+def _at(
+    position: tuple[float, float], symbol: str, color: str
+) -> tuple[list[float], list[float], dict[str, object]]:
+    return [position[0]], [position[1]], {"size": 13, "symbol": symbol, "color": color}

@@ -1,0 +1,80 @@
+"""The flight player: a map with a slot slider, and each slot's links, rates and energies."""
+
+import pandas as pd
+import plotly.graph_objects as go
+
+from hyuav.physics.scenario import Scenario
+from hyuav.viz.html.player_flight import Flight, read_flight
+from hyuav.viz.html.player_layout import animation_controls, layouts
+from hyuav.viz.html.player_map import fixed_on_map, moving_on_map
+from hyuav.viz.html.player_panels import fixed_in_panels, highest, moving_in_panels
+from hyuav.viz.html.style import base_layout, scheme_color, scheme_label
+
+
+def flight_player(
+    scenario: Scenario,
+    flights: pd.DataFrame,
+    scheme: str,
+    episode: int = 0,
+    *,
+    narrow: bool = False,
+) -> go.Figure:
+    """A flight slot by slot, moved by a slider or played.
+
+    The map shows the path flown so far (relaying solid, jamming dashed), which UEs offload
+    (filled), the links that are alive and the coverage that counts; beside it stand the slot's
+    secrecy rates, its energies as shares of the budgets, and the sum-rates of all slots.
+
+    Args:
+        scenario: that was flown.
+        flights: a row per slot, as in :attr:`hyuav.experiments.evaluation.Evaluation.flights`.
+        scheme: whose flight is shown.
+        episode: which of its flights.
+        narrow: whether the panels stand below the map, as for a phone, and not beside it. The
+            figure's ``layout.meta`` holds what to change for ``wide`` and ``narrow``.
+
+    Raises:
+        InputError: there is no such flight, or it is not one of this scenario.
+    """
+    flight = read_flight(scenario, flights, scheme, episode)
+    color, num_slots = scheme_color(scheme), len(flight.relay)
+    fixed = [*fixed_on_map(scenario, flight), *fixed_in_panels(flight)]
+    moving = [
+        [
+            *moving_on_map(scenario, flight, slot, color),
+            *moving_in_panels(scenario, flight, slot, color),
+        ]
+        for slot in range(num_slots)
+    ]
+    titles = [_title(scheme, flight, slot) for slot in range(num_slots)]
+    both = layouts(scenario, num_slots, highest(flight))
+    figure = go.Figure(
+        data=[*fixed, *moving[0]],
+        frames=[
+            {
+                "name": str(slot + 1),
+                "data": moving[slot],
+                "traces": list(range(len(fixed), len(fixed) + len(moving[slot]))),
+                "layout": {"title": {"text": titles[slot]}},
+            }
+            for slot in range(num_slots)
+        ],
+        layout=base_layout() | {"title": {"text": titles[0]}},
+    )
+    figure.update_layout(animation_controls(num_slots))
+    figure.update_layout(both["shared"])
+    figure.update_layout(both["narrow" if narrow else "wide"])
+    figure.update_layout(meta={name: both[name] for name in ("wide", "narrow")})
+    return figure
+
+
+def _title(scheme: str, flight: Flight, slot: int) -> str:
+    """What a person reads of the slot, on two lines."""
+    row, relay = flight.rows.iloc[slot], flight.relay[slot]
+    count, total = int(flight.offloading[slot].sum()), flight.offloading.shape[1]
+    mode = "relay" if relay else "jamming"
+    off_map = ", turned back at the edge" if row["off_map"] else ""
+    return (
+        f"<b>{scheme_label(scheme)}, slot {slot + 1} of {len(flight.relay)}: {mode}</b>{off_map}"
+        f"<br>{count} of {total} UEs offload, {row['secrecy_sum_rate']:.2f} bps/Hz"
+    )

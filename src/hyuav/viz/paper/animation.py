@@ -1,0 +1,162 @@
+"""A flight in motion: coverage, links and modes, slot by slot."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.animation import PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
+
+from hyuav._support.durable import write_durably
+from hyuav.envs.rendering import (
+    UE_COLOR,
+    draw_coverage,
+    draw_flight,
+    draw_scenario,
+)
+from hyuav.experiments.evaluation import LABELS
+from hyuav.physics.scenario import Point, Scenario
+from hyuav.viz.paper.flights import path_of
+from hyuav.viz.paper.maps import MODE_COLORS
+from hyuav.viz.paper.style import COLORS, STYLE
+
+INCHES, DPI = (3.5, 5.0), 140
+SLOTS_PER_SECOND, SLOTS_HELD = 2, 3
+"""How fast the slots follow each other, and for how many the last one stays."""
+
+LINK_COLOR = "0.35"
+"""Of what UEs send."""
+
+JAMMING: dict[str, Any] = {
+    "color": MODE_COLORS["jamming"],
+    "linestyle": "dashed",
+    "linewidth": 1.6,
+}
+"""The line from the helper to the eavesdropper that it jams."""
+
+
+def animate_flight(scenario: Scenario, slots: pd.DataFrame, file: Path) -> None:
+    """Write a flight as an animated GIF: who offloads to whom, in which mode, and what it brings.
+
+    Args:
+        scenario: that is flown.
+        slots: of one flight, a row per slot as in :attr:`Evaluation.flights`.
+        file: to write.
+
+    Raises:
+        OSError: it cannot be written; then an earlier one is still there.
+    """
+    with mpl.rc_context(STYLE), tempfile.TemporaryDirectory() as elsewhere:
+        figure = Figure(figsize=INCHES)
+        over_map = figure.add_axes((0.17, 0.395, 0.79, 0.79 * INCHES[0] / INCHES[1]))
+        over_time = figure.add_axes((0.17, 0.21, 0.79, 0.09))
+        _draw_legend(figure)
+        writer = PillowWriter(fps=SLOTS_PER_SECOND)
+        drawn = Path(elsewhere) / file.name  # Pillow tells the format by the name
+        with writer.saving(figure, str(drawn), DPI):
+            for flown in (*range(len(slots) + 1), *[len(slots)] * SLOTS_HELD):
+                over_map.clear()
+                _draw_map(over_map, scenario, slots.iloc[:flown])
+                over_time.clear()
+                _draw_rates(over_time, slots, flown)
+                writer.grab_frame()
+        write_durably(file, drawn.read_bytes())
+
+
+def _draw_map(axes: Axes, scenario: Scenario, slots: pd.DataFrame) -> None:
+    """The flight up to now, with the links of the last of its slots."""
+    offloading = slots["offloading"].iloc[-1] if len(slots) else [False] * scenario.num_ues
+    draw_scenario(axes, scenario, offloading)
+    path, relays = path_of(scenario, slots), slots["relay"].to_numpy()
+    scheme = "proposed" if not len(slots) else str(slots["scheme"].iloc[0])
+    helper = (float(path[-1, 0]), float(path[-1, 1]))
+    draw_coverage(axes, helper, scenario.coverage_radius, COLORS[scheme])
+    draw_flight(axes, path, relays, COLORS[scheme])
+    ring: Any = {
+        "marker": "o",
+        "markersize": 10.0,
+        "markerfacecolor": "white",
+        "markeredgewidth": 1.6,
+    }
+    axes.plot(*helper, color=COLORS[scheme], clip_on=False, zorder=4.5, **ring)
+    _draw_letters(axes, scenario, helper)
+    title = f"slot {len(slots)} of {scenario.num_slots}"
+    if len(slots):
+        now = slots.iloc[-1]
+        mode = "relays" if now["relay"] else "jams"
+        axes.set_title(f"{LABELS[scheme]}, {title}: the helper {mode}")
+        _draw_links(axes, scenario, helper, now)
+    else:
+        axes.set_title(f"{title}: start")
+
+
+def _draw_letters(axes: Axes, scenario: Scenario, helper: Point) -> None:
+    """Name the UAVs: the helper within its ring, the others beside their places."""
+    places = {
+        "L": (scenario.legitimate_position, (9, -9)),
+        "E": (scenario.eavesdropper_position, (-10, 7)),
+        "H": (helper, (0, 0)),
+    }
+    for letter, (place, offset) in places.items():
+        axes.annotate(
+            letter,
+            place,
+            offset,
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            weight="bold",
+            fontsize=7,
+            path_effects=[withStroke(linewidth=1.5, foreground="white")],
+            zorder=5,
+        )
+
+
+def _draw_links(axes: Axes, scenario: Scenario, helper: Point, now: pd.Series) -> None:
+    """From each UE that offloads to L and, in relay mode, by way of the helper; or the jamming."""
+    sending = np.asarray(scenario.ue_positions)[np.asarray(now["offloading"], dtype=bool)]
+    style: Any = {"color": LINK_COLOR, "linewidth": 0.7, "zorder": 2.2}
+    receivers = [scenario.legitimate_position, *([helper] if now["relay"] else [])]
+    for receiver in receivers:
+        for ue in sending:
+            axes.plot(*zip(ue, receiver, strict=True), **style)
+    if now["relay"] and len(sending):
+        ends = (helper, scenario.legitimate_position)
+        axes.plot(*zip(*ends, strict=True), **style | {"linewidth": 1.6})
+    if not now["relay"]:
+        ends = (helper, scenario.eavesdropper_position)
+        axes.plot(*zip(*ends, strict=True), **JAMMING, zorder=2.6)
+
+
+def _draw_rates(axes: Axes, slots: pd.DataFrame, flown: int) -> None:
+    """The secrecy sum-rate of each slot up to now."""
+    past = slots.iloc[:flown]
+    colors = [MODE_COLORS["relay" if relay else "jamming"] for relay in past["relay"]]
+    axes.bar(past["slot"], past["secrecy_sum_rate"], color=colors, width=0.8)
+    highest = max(float(slots["secrecy_sum_rate"].max()), 1.0)
+    axes.set(xlim=(0.4, len(slots) + 0.6), ylim=(0, 1.05 * highest), xlabel="Slot")
+    axes.set_ylabel("Sum-rate\n(bps/Hz)")
+    axes.xaxis.set_major_locator(MaxNLocator(10, integer=True, steps=[1, 2, 5, 10]))
+
+
+def _draw_legend(figure: Figure) -> None:
+    ue: Any = {"color": UE_COLOR, "marker": "o", "markersize": 3.5}
+    handles = [
+        Line2D([], [], **ue, markerfacecolor=UE_COLOR, linestyle="", label="UE offloads"),
+        Line2D([], [], **ue, markerfacecolor="white", linestyle="", label="UE computes itself"),
+        Line2D([], [], color=LINK_COLOR, linewidth=0.7, label="offloading"),
+        Line2D([], [], **JAMMING, label="jamming of E"),
+        *(
+            Patch(facecolor=MODE_COLORS[mode], label=f"sum-rate, {mode}")
+            for mode in ("relay", "jamming")
+        ),
+    ]
+    figure.legend(handles=handles, loc="lower center", ncols=2, frameon=False, fontsize=6.5)

@@ -1,0 +1,96 @@
+"""Secrecy sum-rate against the time horizon: the paper's Fig. 4."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from hyuav.experiments.evaluation import LABELS, OPTIMA
+from hyuav.viz.paper.style import COLORS, COLUMN_WIDTH, COMPARED, DOTTED, LINES, STYLE
+
+MARKERS = {"proposed": "o", "ja_ot": "s", "re_ot": "^", "re_lt": "v", "ja_lt": "D"}
+
+
+def horizon_table(summaries: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+    """What each scheme and optimum earns over each horizon.
+
+    Args:
+        summaries: of evaluations, as :attr:`Evaluation.summary`, one for each horizon.
+
+    Returns:
+        ``scheme``, ``num_slots``, ``learners``, ``episodes``; in bps/Hz the ``mean`` of the secrecy
+        sum-rate and its 95 % interval ``low`` to ``high``.
+    """
+    rows = []
+    for summary in sorted(summaries, key=lambda summary: int(summary["num_slots"])):
+        for scheme in (*COMPARED, *OPTIMA.values()):
+            if scheme in summary["schemes"]:
+                result = summary["schemes"][scheme]
+                rate = result["secrecy_sum_rate"]
+                rows.append(
+                    {
+                        "scheme": scheme,
+                        "num_slots": summary["num_slots"],
+                        "learners": result["learners"],
+                        "episodes": summary["episodes"],
+                        "mean": rate["mean"],
+                        "low": rate["ci95"][0],
+                        "high": rate["ci95"][1],
+                    }
+                )
+    return pd.DataFrame(rows)
+
+
+def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
+    """Secrecy sum-rate against the horizon, for the schemes and the optimum of each mode rule.
+
+    Args:
+        table: of :func:`horizon_table`.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(COLUMN_WIDTH, 3.0), layout="constrained")
+        axes = figure.add_subplot()
+        curves = {str(name): rows for name, rows in table.groupby("scheme")}
+        drawn = [name for name in (*OPTIMA.values(), *COMPARED) if name in curves]
+        aside = dict(zip(drawn, _aside(len(drawn), table["num_slots"]), strict=True))
+        handles = []
+        for scheme in drawn:
+            rows, learned = curves[scheme], scheme in COMPARED
+            bars = axes.errorbar(
+                rows["num_slots"] + aside[scheme],
+                rows["mean"],
+                yerr=[rows["mean"] - rows["low"], rows["high"] - rows["mean"]],
+                color=COLORS[scheme],
+                linestyle=LINES[scheme] if learned else DOTTED,
+                marker=MARKERS.get(scheme, ""),
+                capsize=2.0 if learned else 1.0,
+                elinewidth=0.8,
+                label=LABELS[scheme],
+            )
+            if learned:
+                handles.append(bars)
+        optimum = Line2D([], [], color="0.3", linestyle=DOTTED, label="its optimum")
+        axes.set_xticks(sorted(set(table["num_slots"])))
+        axes.set(xlabel="Time horizon (slots)", ylabel="Secrecy sum-rate (bps/Hz)")
+        axes.set_ylim(0.0, 1.08 * table["mean"].max())  # few learners may have wider intervals
+        axes.grid(color="0.92", linewidth=0.5)
+        axes.set_axisbelow(True)
+        figure.legend(
+            handles=[*handles, optimum],
+            loc="outside lower center",
+            ncols=3,
+            frameon=False,
+            columnspacing=1.2,
+        )
+        return figure
+
+
+def _aside(curves: int, horizons: "pd.Series[int]") -> list[float]:
+    """How far each curve is moved along the axis, in slots, so that no bar hides another."""
+    places = np.unique(horizons)
+    gap = float(np.diff(places).min()) if len(places) > 1 else 1.0
+    return [0.025 * gap * (curve - (curves - 1) / 2) for curve in range(curves)]

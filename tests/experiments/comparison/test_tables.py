@@ -1,0 +1,60 @@
+"""What a comparison prints."""
+
+import itertools
+import re
+
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from hyuav.experiments.comparison.directory import Summary
+from hyuav.experiments.comparison.statistics import (
+    improvements,
+    summarize_algorithms,
+    summarize_cells,
+)
+from hyuav.experiments.comparison.tables import label, print_tables
+
+
+def printed(algorithms: list[str], capsys: pytest.CaptureFixture[str]) -> list[str]:
+    results = pd.DataFrame(
+        [
+            {
+                "algorithm": algorithm,
+                "scenario": "two_clusters",
+                "scheme": "relay",
+                "num_slots": 10,
+                "seed": seed,
+                "fraction": 0.9 + 0.01 * place + 0.001 * seed,
+                "episodes_to_threshold": 100.0,
+                "seconds_to_threshold": 1.0,
+                "seconds": 2.0,
+                "stopped": float("nan"),
+            }
+            for (place, algorithm), seed in itertools.product(enumerate(algorithms), range(3))
+        ]
+    )
+    cells = summarize_cells(results, 0.97)
+    whole = summarize_algorithms(results, 0.97)
+    nothing = pd.DataFrame()
+    summary = Summary(results, nothing, cells, whole, nothing, improvements(results))
+    print_tables(summary, 0.97, Console(width=200))
+    lines = capsys.readouterr().out.splitlines()
+    pairs = next(i for i, line in enumerate(lines) if "P(row" in line)
+    assert max(len(line.rstrip()) for line in lines) <= 80
+    return lines[pairs:]
+
+
+def test_few_algorithms_are_set_beside_each_other(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = printed(["ddpg_robust", "ddpg", "td3"], capsys)
+    (row,) = (line for line in lines if line.startswith(" DDPG  "))
+    assert re.findall(r"\d+ %|-", row) == ["100 %", "-", "0 %"]
+
+
+def test_many_algorithms_are_set_beside_the_first(capsys: pytest.CaptureFixture[str]) -> None:
+    pieces = ("clock", "layer_norm", "geofence", "warm_up_episodes", "repeat_every")
+    entries = ["ddpg_robust", *(f"ddpg_robust-{piece}" for piece in pieces)]
+    lines = printed(entries, capsys)
+    for entry in entries[1:]:
+        (row,) = (line for line in lines if label(entry) in line)
+        assert re.findall(r"\d+ %|-", row) == ["100 %"]

@@ -1,0 +1,36 @@
+"""What a recipe says of its own call; its refusals are tested with the recipes."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
+
+from hyuav.experiments.configuration import override, same_call
+
+
+@pytest.mark.parametrize(
+    ("mode", "others"), [(RunMode.RUN, ["-q", "seed=0,1"]), (RunMode.MULTIRUN, ["seed=1"])]
+)
+def test_a_job_goes_on_by_its_own_call_also_where_it_was_one_of_several(
+    monkeypatch: pytest.MonkeyPatch, mode: RunMode, others: list[str]
+) -> None:
+    overrides = SimpleNamespace(task=["seed=1", "output=elsewhere"])
+    monkeypatch.setattr(HydraConfig, "get", lambda: SimpleNamespace(mode=mode, overrides=overrides))
+    monkeypatch.setattr(sys, "argv", ["compare.py", "-q", "seed=0,1", "output=elsewhere"])
+    assert same_call("output", Path("runs/1")) == [*others, "output=runs/1"]
+
+
+@pytest.mark.parametrize(
+    ("path", "told"),
+    [
+        (Path.cwd() / "runs" / "one", "run=runs/one"),
+        (Path("/somewhere/else"), "run=/somewhere/else"),
+        (Path("a b/c"), 'run="a b/c"'),
+        (Path("name"), 'run="name"'),
+    ],
+)
+def test_a_path_is_told_as_the_command_line_takes_it(path: Path, told: str) -> None:
+    assert override("run", path) == told

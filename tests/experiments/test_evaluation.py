@@ -1,0 +1,171 @@
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from scipy import stats
+
+from batches import TEN_UES
+from hyuav import InputError, Scenario
+from hyuav.experiments.evaluation import (
+    LABELS,
+    MODE_RULES,
+    OPTIMA,
+    EvaluationParameters,
+    Policy,
+    confidence_interval,
+    evaluate,
+    fly,
+    secrecy_sum_rate,
+)
+from hyuav.learning.ddpg import DDPG
+from hyuav.learning.policy import LearnedPolicy
+from hyuav.learning.weights import copy_weights
+from hyuav.references.optimum import FlightPolicy, solve
+from hyuav.references.straight import ja_lt, re_lt
+
+SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
+FEW = EvaluationParameters(episodes=40, flights=2, seed=5)
+
+
+@pytest.fixture(scope="module")
+def policies() -> dict[str, list[Policy]]:
+    algorithm = DDPG(hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(2, TEN_UES).loss)
+    optima = solve(SCENARIO, resolution=2.0)
+    return {
+        "re_lt": [Policy(re_lt(SCENARIO))],
+        "ja_lt": [Policy(ja_lt(SCENARIO))],
+        "proposed": [Policy(LearnedPolicy(SCENARIO, algorithm, weights, range(2)), 2)],
+        **{
+            OPTIMA[rule]: [Policy(FlightPolicy(optimum.path, SCENARIO))]
+            for rule, optimum in optima.items()
+        },
+    }
+
+
+def test_the_summary_has_the_promised_fields(policies: dict[str, list[Policy]]) -> None:
+    summary = evaluate(SCENARIO, "two_clusters", policies, FEW).summary
+    assert summary["scenario"] == "two_clusters"
+    assert (summary["num_slots"], summary["episodes"]) == (10, 40)
+    assert list(summary["schemes"]) == [scheme for scheme in LABELS if scheme in policies]
+    for result in summary["schemes"].values():
+        low, high = result["secrecy_sum_rate"]["ci95"]
+        assert low < result["secrecy_sum_rate"]["mean"] < high
+        assert {"relay_share", "offloading_share", "off_map", "budget_violations"} <= set(result)
+        assert {"ue_energy", "edge_energy", "helper_energy"} <= set(result)
+    assert summary["schemes"]["optimum"]["fraction_of_optimum"] == 1.0
+    assert json.loads(json.dumps(summary)) == summary
+
+
+def test_a_fixed_mode_scheme_is_measured_against_its_own_optimum_and_the_hybrid_one(
+    policies: dict[str, list[Policy]],
+) -> None:
+    schemes = evaluate(SCENARIO, "two_clusters", policies, FEW).summary["schemes"]
+    mean = {name: result["secrecy_sum_rate"]["mean"] for name, result in schemes.items()}
+    jamming = schemes["ja_lt"]
+    assert jamming["fraction_of_optimum"] == mean["ja_lt"] / mean["ja_optimum"]
+    assert jamming["fraction_of_hybrid_optimum"] == mean["ja_lt"] / mean["optimum"]
+
+
+def test_all_schemes_fly_through_the_same_fading() -> None:
+    everywhere = SCENARIO.helper_start
+    still = dataclasses.replace(SCENARIO, eavesdropper_position=everywhere)
+    hovering = Policy(ja_lt(still))
+    few = EvaluationParameters(episodes=5, flights=5, seed=3)
+    twice = [fly(still, scheme, hovering, few).slots for scheme in ("ja_lt", "optimum")]
+    for rates in ("relay_sum_rate", "jamming_sum_rate"):
+        first, second = (flown["diagnostics", rates] for flown in twice)
+        assert torch.equal(first, second)
+
+
+def test_all_learners_fly_through_the_same_fading() -> None:
+    twins = Policy(ja_lt(SCENARIO), 2)
+    first, second = fly(SCENARIO, "ja_lt", twins, FEW).totals["secrecy_sum_rate"]
+    assert torch.equal(first, second)
+
+
+def test_a_learner_earns_among_others_what_it_earns_alone() -> None:
+    algorithm = DDPG(hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(3, TEN_UES).loss)
+    among = Policy(LearnedPolicy(SCENARIO, algorithm, weights, [2, 0]), 2)
+    alone = Policy(LearnedPolicy(SCENARIO, algorithm, weights, [0]))
+    torch.testing.assert_close(
+        fly(SCENARIO, "proposed", among, FEW).totals["secrecy_sum_rate"][1:],
+        fly(SCENARIO, "proposed", alone, FEW).totals["secrecy_sum_rate"],
+    )
+
+
+def test_the_totals_are_sums_over_the_slots_of_an_episode() -> None:
+    every = EvaluationParameters(episodes=6, flights=6)
+    flown = fly(SCENARIO, "optimum", Policy(re_lt(SCENARIO)), every)
+    diagnostics = flown.slots["diagnostics"]
+    for name, per_slot in (
+        ("secrecy_sum_rate", secrecy_sum_rate(flown.slots)),
+        ("relay_share", flown.slots["mode"].squeeze(-1)),
+        ("offloading_share", diagnostics["offloading"].double().mean(dim=-1)),
+        ("ue_energy", diagnostics["ue_energy"].mean(dim=-1)),
+        ("helper_energy", diagnostics["helper_energy"].squeeze(-1)),
+    ):
+        expected = per_slot.double().sum(dim=-1)
+        torch.testing.assert_close(flown.totals[name][0], expected, rtol=1e-5, atol=1e-6)
+
+
+def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> None:
+    leaving = dataclasses.replace(SCENARIO, eavesdropper_position=(-100.0, -100.0))
+    policy = Policy(ja_lt(dataclasses.replace(leaving, num_slots=3)))
+    flown = fly(leaving, "ja_lt", policy, EvaluationParameters(episodes=4, flights=4)).slots
+    assert flown["off_map"].any()
+    torch.testing.assert_close(
+        secrecy_sum_rate(flown), flown["diagnostics", "jamming_sum_rate"].squeeze(-1)
+    )
+
+
+def test_flights_are_kept_a_row_per_slot(policies: dict[str, list[Policy]], tmp_path: Path) -> None:
+    evaluation = evaluate(SCENARIO, "two_clusters", policies, FEW)
+    evaluation.save(tmp_path)
+    flights = pd.read_parquet(tmp_path / "flights.parquet")
+    assert len(flights) == len(policies) * 2 * 10
+    row = flights[(flights.scheme == "re_lt") & (flights.episode == 1) & (flights.slot == 10)]
+    assert len(row) == 1
+    assert row.relay.item()
+    assert len(row.offloading.item()) == SCENARIO.num_ues
+    assert row.secrecy_sum_rate.item() == pytest.approx(sum(row.secrecy_rate.item()), rel=1e-5)
+    assert json.loads((tmp_path / "evaluation.json").read_text())["episodes"] == 40
+
+
+def test_the_interval_of_one_learner_speaks_of_the_episodes() -> None:
+    returns = np.random.default_rng(0).normal(50, 3, (1, 200))
+    low, high = confidence_interval(returns)
+    half_width = stats.t.ppf(0.975, 199) * returns.std(ddof=1) / np.sqrt(200)
+    assert (low, high) == pytest.approx((returns.mean() - half_width, returns.mean() + half_width))
+
+
+def test_the_interval_of_several_learners_speaks_of_the_learners() -> None:
+    generator = np.random.default_rng(0)
+    returns = generator.normal(50, 5, (6, 1)) + generator.normal(0, 0.1, (6, 400))
+    low, high = confidence_interval(returns)
+    assert high - low > 4.0  # without the learners it would be 0.04
+
+
+def test_the_interval_of_a_flight_without_fading_is_its_value() -> None:
+    assert confidence_interval(np.full((1, 10), 7.0)) == [7.0, 7.0]
+
+
+def test_every_scheme_has_a_label_a_mode_rule_and_an_optimum() -> None:
+    assert set(LABELS) == set(MODE_RULES)
+    assert {OPTIMA[rule] for rule in MODE_RULES.values()} <= set(LABELS)
+
+
+def test_an_unknown_scheme_or_none_is_refused() -> None:
+    refused: list[dict[str, list[Policy]]] = [
+        {},
+        {"proposed": []},
+        {"foo": [Policy(re_lt(SCENARIO))]},
+    ]
+    for policies in refused:
+        with pytest.raises(InputError):
+            evaluate(SCENARIO, "two_clusters", policies, FEW)

@@ -1,0 +1,42 @@
+import io
+from typing import Any
+
+import pandas as pd
+from rich.console import Console
+
+from hyuav.experiments.evaluation import Evaluation
+from hyuav.experiments.evaluation_table import print_results
+
+
+def printed(name: str = "square", **more: Any) -> list[str]:
+    result = {
+        "secrecy_sum_rate": {"mean": 59.824, "ci95": [59.661, 59.984]},
+        "fraction_of_hybrid_optimum": 0.9994,
+        "relay_share": 0.118,
+        "offloading_share": 0.79,
+        "off_map": 12.04,
+        "budget_violations": 0.0,
+    }
+    schemes = {"proposed": result | more}
+    summary = {"scenario": name, "num_slots": 20, "episodes": 1000, "schemes": schemes}
+    file = io.StringIO()
+    print_results(Evaluation(summary, pd.DataFrame()), Console(file=file, width=80))
+    return file.getvalue().splitlines()
+
+
+def test_a_scheme_is_a_row_with_its_interval_within_80_columns() -> None:
+    lines = printed()
+    row = next(line for line in lines if line.lstrip().startswith("Proposed"))
+    assert row.split() == [
+        *("Proposed", "59.82", "[59.66,", "59.98]", "-"),
+        *("99.9", "%", "11.8", "%", "79.0", "%", "12.0"),
+    ]
+    assert max(map(len, lines)) <= 80
+
+
+def test_energy_budgets_that_are_exceeded_are_told() -> None:
+    assert "Proposed: 0.50 energy budgets exceeded per episode" in printed(budget_violations=0.5)
+
+
+def test_a_name_is_no_markup() -> None:
+    assert any("[/] [red]x" in line for line in printed("[/] [red]x"))

@@ -1,0 +1,149 @@
+"""What is to be expected of flights, by all that is remembered."""
+
+import dataclasses
+
+import pytest
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+
+from hyuav import Scenario
+from hyuav.learning.guide.control_variate import ControlVariate
+from hyuav.learning.guide.reward_model import MANY_UES, Expectation
+from hyuav.physics.layout import disk
+from hyuav.physics.slot import SecureOffloadingSystem
+
+SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
+SYSTEM = SecureOffloadingSystem(SCENARIO)
+POWERS = 3 * SCENARIO.num_ues + 2
+
+
+def expectation(
+    learners: int = 1, scale: float = 0.05, scenario: Scenario = SCENARIO
+) -> Expectation:
+    torch.manual_seed(0)
+    return Expectation(learners, ControlVariate(learners, scenario, scale, clock=True), scale)
+
+
+def earned(place: Tensor) -> Tensor:
+    """bps/Hz at places (..., 2) in units of half the map's side, by how many UEs are covered."""
+    distances = SYSTEM.distances(place * 100.0)[..., : SCENARIO.num_ues]
+    return (distances <= SCENARIO.coverage_radius).float().sum(dim=-1, keepdim=True) + place[
+        ..., :1
+    ]
+
+
+def memory(places: Tensor, scale: float = 0.05) -> TensorDictBase:
+    """Slots (n, N) without luck that ended at ``places`` (n, N, 2)."""
+    clock = torch.rand(len(places), 1, 1, generator=torch.Generator().manual_seed(3)) * 2.0 - 1.0
+    clock = clock.expand(*places.shape[:-1], 1)
+    after = TensorDict(
+        observation=torch.cat([places, clock], dim=-1),
+        reward=scale * earned(places),
+        fading=torch.ones(*places.shape[:-1], POWERS),
+        batch_size=places.shape[:-1],
+    )
+    return TensorDict(next=after, batch_size=places.shape[:-1])
+
+
+def around(center: tuple[float, float], spread: float, learners: int = 1) -> Tensor:
+    generator = torch.Generator().manual_seed(1)
+    normal = torch.randn(400, learners, 2, generator=generator)
+    return (torch.tensor(center) + spread * normal).clamp(-1.0, 1.0)
+
+
+def test_it_finds_a_sliver_of_coverage_that_was_never_visited() -> None:
+    regression = expectation()
+    places = around((-0.1, 0.0), 0.4)
+    visited = earned(places).max()
+    regression.update(memory(places), torch.zeros(1, regression.size))
+    x, y = torch.meshgrid(
+        torch.linspace(-0.6, 0.4, 81), torch.linspace(-0.5, 0.5, 81), indexing="ij"
+    )
+    grid = torch.stack([x, y], dim=-1).reshape(1, 1, -1, 2)
+    expected, _ = regression.of(grid)
+    truth = earned(grid).squeeze()
+    assert truth.max() >= visited
+    error = (expected.squeeze() - truth).abs()
+    assert error.quantile(0.95) < 0.15  # but for places at an edge, or far out
+    assert truth[expected.argmax()] == pytest.approx(truth.max().item(), abs=0.05)
+
+
+def test_a_flight_is_worth_the_sum_of_its_slots() -> None:
+    regression = expectation(2)
+    regression.update(memory(around((0.0, 0.0), 0.3, 2)), torch.zeros(2, regression.size))
+    way = torch.linspace(-0.3, 0.3, 5).reshape(5, 1, 1, 1).expand(5, 2, 3, 2)
+    expected, guessed = regression.of(way)
+    assert expected.shape == guessed.shape == (2, 3)
+    torch.testing.assert_close(expected, earned(way).squeeze(-1).sum(dim=0), atol=0.4, rtol=0.0)
+
+
+def test_guesses_differ_where_little_is_known() -> None:
+    regression = expectation()
+    known, unknown = (-0.3, 0.1), (0.9, -0.9)
+    way = torch.tensor([known, unknown]).reshape(1, 1, 2, 2)
+    guesses = []
+    slots = memory(around(known, 0.1))
+    noise = torch.randn(400, 1, 1, generator=torch.Generator().manual_seed(2))
+    slots["next", "reward"] += 0.05 * 0.3 * noise
+    for _ in range(3):  # until it knows how much is noise
+        regression.update(slots, torch.zeros(1, regression.size))
+    assert regression.noise.item() == pytest.approx(0.3**2, rel=0.2)
+    for seed in range(40):
+        normals = torch.randn(1, regression.size, generator=torch.Generator().manual_seed(seed))
+        regression.update(slots, normals)
+        guesses.append(regression.of(way)[1].squeeze(0))
+    spread = torch.stack(guesses).std(dim=0)
+    assert spread[1] > 10.0 * spread[0]
+
+
+def test_without_normals_a_guess_is_what_is_expected() -> None:
+    regression = expectation()
+    regression.update(memory(around((0.0, 0.0), 0.3)), torch.zeros(1, regression.size))
+    assert torch.equal(regression.mean, regression.guess)
+    assert regression.mean.any()
+
+
+def test_what_cannot_be_solved_leaves_that_learner_as_it_was() -> None:
+    regression = expectation(2)
+    slots = memory(around((0.0, 0.0), 0.3, 2))
+    slots["next", "reward"][:, 0] = torch.nan
+    regression.update(slots, torch.zeros(2, regression.size))
+    assert not regression.mean[0].any()
+    assert regression.mean[1].any()
+    assert regression.noise.isfinite().all()
+
+
+def test_a_memory_of_one_place_alone_can_be_learned_from() -> None:
+    regression = expectation()
+    slots = memory(torch.zeros(20, 1, 2)).apply(torch.zeros_like)
+    for _ in range(3):
+        regression.update(slots, torch.ones(1, regression.size))
+    assert regression.mean.isfinite().all()
+    assert regression.guess.isfinite().all()
+    assert regression.noise.isfinite().all()
+
+
+def test_learners_share_nothing() -> None:
+    places = around((0.0, 0.0), 0.3, 2)
+    together, alone = expectation(2), expectation(2)
+    normals = torch.randn(2, together.size)
+    together.update(memory(places), normals)
+    other = places.clone()
+    other[:, 0] *= -1.0
+    alone.update(memory(other), normals)
+    torch.testing.assert_close(together.guess[1], alone.guess[1])
+    assert not torch.allclose(together.guess[0], alone.guess[0])
+
+
+def test_many_ues_have_no_features_of_their_own() -> None:
+    crowd = dataclasses.replace(SCENARIO, ue_positions=disk(MANY_UES + 1, seed=0))
+    few = dataclasses.replace(SCENARIO, ue_positions=disk(MANY_UES, seed=0))
+    assert expectation(scenario=few).size > 6 * MANY_UES
+    regression = expectation(scenario=crowd)
+    assert regression.size == expectation().size - 6 * SCENARIO.num_ues
+    assert regression.features(torch.zeros(1, 3, 2), torch.zeros(1, 3, 1)).shape == (
+        1,
+        3,
+        regression.size,
+    )

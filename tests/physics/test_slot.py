@@ -1,0 +1,335 @@
+"""The scenario bound to the equations, compared to published numbers and to scalar loops."""
+
+import dataclasses
+from typing import Any
+
+import pytest
+import torch
+from hypothesis import assume, example, given
+from hypothesis import strategies as st
+
+import reference
+from hyuav import Scenario
+from hyuav.physics.scenario import PRESETS
+from hyuav.physics.slot import SCHEMES, SecureOffloadingSystem, Tasks
+
+TINY = 1e-9
+SEEDS = st.integers(0, 2**31)
+
+
+def without_fading(name: str) -> Scenario:
+    return dataclasses.replace(Scenario.preset(name), fading=False)
+
+
+def double(scenario: Scenario) -> SecureOffloadingSystem:
+    return SecureOffloadingSystem(scenario, dtype=torch.float64)
+
+
+def tasks_of(cycles: list[float]) -> Tasks:
+    size = torch.tensor(cycles, dtype=torch.float64)
+    return Tasks(size, torch.ones_like(size))
+
+
+def random_slot(
+    system: SecureOffloadingSystem, seed: int
+) -> tuple[torch.Tensor | None, Tasks, list[float] | None, list[float]]:
+    """A slot's fading and tasks, as the system and as the reference take them."""
+    generator = torch.Generator().manual_seed(seed)
+    fading = system.draw_fading((), generator)
+    tasks = system.draw_tasks((), generator)
+    powers = None if fading is None else reference.as_list(fading)
+    return fading, tasks, powers, reference.as_list(tasks.cpu_cycles)
+
+
+@pytest.mark.parametrize(
+    ("layout", "helper", "relay", "relaying_ues", "jamming", "jamming_ues"),
+    [
+        ("random_disk", (-20, -20), 1.759638, 5, 0.0, 0),
+        ("random_disk", (0, 0), 0.541016, 4, 0.0, 0),
+        ("random_disk", (100, 100), 0.0, 0, 4.052183, 10),
+        ("two_clusters", (-20, -20), 1.713314, 7, 0.0, 0),
+        ("two_clusters", (-49, 6), 2.391039, 7, 0.0, 0),
+        ("two_clusters", (80, 80), 0.0, 0, 2.714112, 10),
+    ],
+)
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_the_secrecy_sum_rates_of_both_layouts_without_fading(
+    layout: str,
+    helper: tuple[int, int],
+    relay: float,
+    relaying_ues: int,
+    jamming: float,
+    jamming_ues: int,
+    dtype: torch.dtype,
+) -> None:
+    system = SecureOffloadingSystem(without_fading(layout), dtype=dtype)
+    distances = system.distances(torch.tensor(helper, dtype=dtype))
+    gains = system.channel_gains(distances, None)
+    in_relay = system.relay_outcome(distances, gains, None)
+    in_jamming = system.jamming_outcome(gains, None)
+    tolerance = 1e-6 if dtype == torch.float64 else 1e-5
+    assert float(in_relay.sum_rate) == pytest.approx(relay, rel=tolerance)
+    assert float(in_jamming.sum_rate) == pytest.approx(jamming, rel=tolerance)
+    assert int(in_relay.offloading.sum()) == relaying_ues
+    assert int(in_jamming.offloading.sum()) == jamming_ues
+
+
+def test_the_gains_of_the_first_ue_of_two_clusters() -> None:
+    system = double(without_fading("two_clusters"))
+    distances = system.distances(torch.tensor([-40.0, -40.0], dtype=torch.float64))
+    gains = system.channel_gains(distances, None)
+    values = [float(gain.flatten()[0]) for gain in gains]
+    expected = [1.465416e-09, 9.377344e-10, 3.795931e-10, 3.125000e-08, 3.289474e-09]
+    assert values == pytest.approx(expected, rel=1e-6)
+
+
+@given(reference.scenarios(), st.data())
+def test_distances_are_to_the_ues_then_the_legitimate_then_the_eavesdropper_uav(
+    scenario: Scenario, data: st.DataObject
+) -> None:
+    helper = data.draw(reference.helpers(scenario))
+    distances = double(scenario).distances(torch.tensor(helper, dtype=torch.float64))
+    assert reference.as_list(distances) == pytest.approx(reference.distances(scenario, helper))
+
+
+@given(reference.scenarios(), st.data(), SEEDS)
+def test_the_gains_are_those_of_scalar_loops(
+    scenario: Scenario, data: st.DataObject, seed: int
+) -> None:
+    helper = data.draw(reference.helpers(scenario))
+    system = double(scenario)
+    fading, _, powers, _ = random_slot(system, seed)
+    distances = system.distances(torch.tensor(helper, dtype=torch.float64))
+    found = system.channel_gains(distances, fading)
+    expected = reference.gains(scenario, helper, powers)
+    assert reference.as_list(found.ue_to_legitimate) == pytest.approx(expected.g_ul, rel=1e-12)
+    assert reference.as_list(found.ue_to_helper) == pytest.approx(expected.g_uh, rel=1e-12)
+    assert reference.as_list(found.ue_to_eavesdropper) == pytest.approx(expected.g_ue, rel=1e-12)
+    assert float(found.helper_to_legitimate) == pytest.approx(expected.g_hl, rel=1e-12)
+    assert float(found.helper_to_eavesdropper) == pytest.approx(expected.g_he, rel=1e-12)
+
+
+@given(reference.scenarios(), st.data(), SEEDS)
+def test_both_modes_are_those_of_scalar_loops(
+    scenario: Scenario, data: st.DataObject, seed: int
+) -> None:
+    helper = data.draw(reference.helpers(scenario))
+    system = double(scenario)
+    fading, tasks, powers, cycles = random_slot(system, seed)
+    distances = system.distances(torch.tensor(helper, dtype=torch.float64))
+    gains = system.channel_gains(distances, fading)
+    found = {
+        reference.RELAY: system.relay_outcome(distances, gains, tasks),
+        reference.JAMMING: system.jamming_outcome(gains, tasks),
+    }
+    for mode, outcome in found.items():
+        expected = reference.outcome(scenario, helper, powers, cycles, mode)
+        assume(expected.margin > TINY)
+        assert outcome.offloading.tolist() == expected.offloading
+        assert outcome.secrecy_rate.tolist() == pytest.approx(
+            expected.secrecy_rate, rel=1e-9, abs=1e-9
+        )
+        assert float(outcome.sum_rate) == pytest.approx(expected.sum_rate, rel=1e-9, abs=1e-9)
+
+
+@given(reference.scenarios(), st.sampled_from(SCHEMES), st.data())
+def test_flights_are_those_of_scalar_loops(
+    scenario: Scenario, scheme: str, data: st.DataObject
+) -> None:
+    start = data.draw(reference.helpers(scenario))
+    action = data.draw(reference.actions())
+    expected = reference.flight(scenario, scheme, start, action)
+    assume(expected.margin > TINY)
+    system = double(scenario)
+    limit = system.norm_limit([scheme])
+    flown = system.move(
+        torch.tensor(start, dtype=torch.float64),
+        torch.tensor(action, dtype=torch.float64),
+        None if limit is None else limit[0],
+    )
+    assert bool(flown.off_map) == expected.off_map
+    assert flown.position.tolist() == pytest.approx(expected.position, abs=1e-9)
+    assert flown.velocity.tolist() == pytest.approx(expected.velocity, abs=1e-9)
+
+
+@given(reference.scenarios(fading=True), st.data(), SEEDS)
+def test_positions_are_independent_of_the_batch_they_are_evaluated_in(
+    scenario: Scenario, data: st.DataObject, seed: int
+) -> None:
+    points = st.lists(reference.helpers(scenario), min_size=6, max_size=6)
+    position = torch.tensor(data.draw(points), dtype=torch.float64)
+    system = double(scenario)
+    generator = torch.Generator().manual_seed(seed)
+    fading, tasks = system.draw_fading((6,), generator), system.draw_tasks((6,), generator)
+    assert fading is not None
+    relay, jamming = system.sum_rates(
+        position.reshape(2, 3, 2),
+        fading.reshape(2, 3, -1),
+        Tasks(*(part.reshape(2, 3, -1) for part in tasks)),
+    )
+    for row in range(6):
+        alone = system.sum_rates(position[row], fading[row], Tasks(*(part[row] for part in tasks)))
+        torch.testing.assert_close(relay.flatten()[row], alone[0])
+        torch.testing.assert_close(jamming.flatten()[row], alone[1])
+
+
+def test_the_speed_that_the_budget_of_a_scheme_allows() -> None:
+    scenario = dataclasses.replace(
+        Scenario.preset("two_clusters"), helper_energy_budget=100.0, jamming_power=10.0
+    )
+    system = double(scenario)
+    for scheme, transmission in (("relay", 0.006), ("jamming", 10.0), ("hybrid", 10.0)):
+        flight = 0.5 * 9.65 * system.budget_speed(scheme) ** 2
+        assert flight + transmission == pytest.approx(100.0)
+
+
+def test_a_budget_below_the_transmission_energy_leaves_no_flight() -> None:
+    scenario = dataclasses.replace(Scenario.preset("two_clusters"), helper_energy_budget=0.01)
+    system = double(scenario)
+    assert system.budget_speed("jamming") == 0.0
+    assert system.budget_speed("relay") > 0.0
+    limit = system.norm_limit(["jamming"])
+    start = torch.tensor([3.0, 4.0], dtype=torch.float64)
+    for action in (torch.ones(2, dtype=torch.float64), torch.zeros(2, dtype=torch.float64)):
+        assert system.move(start, action, limit).position.flatten().tolist() == [3.0, 4.0]
+
+
+def test_the_papers_budgets_limit_neither_speed_nor_admission() -> None:
+    system = SecureOffloadingSystem(Scenario.preset("two_clusters"))
+    assert system.norm_limit(SCHEMES) is None
+    assert not system.edge_can_saturate
+
+
+def test_with_1024_bytes_in_a_kilobyte_the_budgets_would_not_hold() -> None:
+    scenario = dataclasses.replace(
+        Scenario.preset("two_clusters"), task_size=(20 * 1024 * 8, 30 * 1024 * 8)
+    )
+    assert SecureOffloadingSystem(scenario).edge_can_saturate
+
+
+@pytest.mark.parametrize("beyond", [-1e-3, 1e-3])
+def test_the_edge_can_saturate_exactly_where_all_largest_tasks_exceed_its_budget(
+    beyond: float,
+) -> None:
+    worst = 1e-27 * (10 * 240e3 * 1200) ** 3
+    scenario = dataclasses.replace(
+        Scenario.preset("two_clusters"), edge_energy_budget=worst * (1 + beyond)
+    )
+    assert SecureOffloadingSystem(scenario).edge_can_saturate == (beyond < 0)
+
+
+@given(
+    st.lists(st.floats(1e8, 3e8), min_size=10, max_size=10),
+    st.floats(1e-3, 30.0),
+    SEEDS,
+)
+@example([2.88e8] * 10, 24.0, 0)
+def test_the_edge_admits_the_best_secrecy_rates_first_and_stays_within_its_budget(
+    cycles: list[float], budget: float, seed: int
+) -> None:
+    scenario = dataclasses.replace(Scenario.preset("random_disk"), edge_energy_budget=budget)
+    system = double(scenario)
+    fading = system.draw_fading((), torch.Generator().manual_seed(seed))
+    distances = system.distances(torch.tensor([80.0, 80.0], dtype=torch.float64))
+    gains = system.channel_gains(distances, fading)
+    unlimited = system.jamming_outcome(gains, None)
+    admitted = system.jamming_outcome(gains, tasks_of(cycles))
+    load = sum(c for c, z in zip(cycles, admitted.offloading.tolist(), strict=True) if z)
+    assert 1e-27 * load**3 <= budget * (1 + 1e-9)
+    left_out = unlimited.offloading & ~admitted.offloading
+    assert not (admitted.offloading & ~unlimited.offloading).any()
+    if left_out.any():
+        best_left_out = unlimited.secrecy_rate[left_out].max()
+        assert (unlimited.secrecy_rate[admitted.offloading] >= best_left_out).all()
+        next_in_line = int(torch.where(left_out, unlimited.secrecy_rate, -1.0).argmax())
+        assert 1e-27 * (load + cycles[next_in_line]) ** 3 > budget * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize(
+    ("case", "changes"),
+    [
+        ("helper above L", {}),
+        ("all UEs on one point", {"ue_positions": [(5.0, 5.0)] * 10}),
+        ("all UEs below L", {"ue_positions": [(0.0, 0.0)] * 3}),
+        ("E above L", {"eavesdropper_position": (0.0, 0.0)}),
+        ("E at L", {"eavesdropper_position": (0.0, 0.0), "eavesdropper_altitude": 80.0}),
+        ("E at the helper's altitude", {"eavesdropper_altitude": 80.0}),
+        ("one UE", {"ue_positions": [(1.0, 2.0)]}),
+        ("1000 UEs", {"ue_positions": [(i / 25, -i / 50) for i in range(1000)]}),
+        ("no UE power", {"ue_power": 0.0}),
+        ("no helper power", {"relay_power": 0.0, "jamming_power": 0.0}),
+        ("no path gain", {"ground_to_air_gain": 0.0, "air_to_air_gain": 0.0}),
+        ("no coverage", {"coverage_radius": 0.0}),
+        ("very low altitude", {"altitude": 1e-6, "eavesdropper_altitude": 1e-6}),
+        ("pure scatter", {"ground_to_air_k_factor": -100.0, "air_to_air_k_factor": -100.0}),
+        ("pure line of sight", {"ground_to_air_k_factor": 100.0, "air_to_air_k_factor": 100.0}),
+    ],
+)
+def test_degenerate_worlds_have_finite_rates(
+    case: str, changes: dict[str, Any], dtype: torch.dtype
+) -> None:
+    scenario = dataclasses.replace(Scenario.preset("two_clusters"), **changes)
+    system = SecureOffloadingSystem(scenario, dtype=dtype)
+    position = torch.tensor([[0.0, 0.0], [80.0, 80.0], [100.0, -100.0], [5.0, 5.0]], dtype=dtype)
+    generator = torch.Generator().manual_seed(0)
+    fading, tasks = system.draw_fading((4,), generator), system.draw_tasks((4,), generator)
+    for rate in system.sum_rates(position, fading, tasks):
+        assert rate.shape == (4,), case
+        assert rate.dtype == dtype, case
+        assert bool(rate.isfinite().all()), case
+        assert bool((rate >= 0).all()), case
+
+
+@pytest.mark.parametrize("layout", sorted(PRESETS))
+def test_sum_rates_are_differentiable_in_the_position(layout: str) -> None:
+    system = double(without_fading(layout))
+    # Away from the points where a UE starts or stops to offload.
+    position = torch.tensor([[-22.0, -19.0], [90.0, 85.0]], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(system.sum_rates, (position,))
+    relay, jamming = system.sum_rates(position)
+    slope = torch.autograd.grad(relay.sum() + jamming.sum(), position)[0]
+    assert bool((slope.norm(dim=-1) > 1e-6).all())
+
+
+def test_single_and_double_precision_agree() -> None:
+    scenario = Scenario.preset("random_disk")
+    exact, rounded = double(scenario), SecureOffloadingSystem(scenario)
+    generator = torch.Generator().manual_seed(5)
+    position = 200 * torch.rand(4000, 2, generator=generator, dtype=torch.float64) - 100
+    fading = exact.draw_fading((4000,), generator)
+    assert fading is not None
+    both = zip(
+        exact.sum_rates(position, fading),
+        rounded.sum_rates(position.float(), fading.float()),
+        strict=True,
+    )
+    for expected, found in both:
+        assert found.dtype == torch.float32
+        close = (found - expected).abs() < 1e-4
+        # A UE at the very threshold may fall on the other side: that moves C by epsilon.
+        assert int((~close).sum()) <= 2
+
+
+def test_a_helper_above_l_receives_the_gain_at_the_reference_distance() -> None:
+    system = double(without_fading("two_clusters"))
+    gains = [
+        float(
+            system.channel_gains(
+                system.distances(torch.tensor([x, 0.0], dtype=torch.float64)), None
+            ).helper_to_legitimate
+        )
+        for x in (0.0, 0.5, 1.0, 2.0)
+    ]
+    assert gains == pytest.approx([1e-4, 1e-4, 1e-4, 2.5e-5])
+
+
+def test_rates_that_a_full_edge_server_would_lower_are_not_given_without_tasks() -> None:
+    scenario = dataclasses.replace(without_fading("random_disk"), edge_energy_budget=1.0)
+    system, position = double(scenario), torch.tensor([80.0, 80.0], dtype=torch.float64)
+    assert system.edge_can_saturate
+    with pytest.raises(ValueError, match=r"^tasks: expected"):
+        system.sum_rates(position)
+    admitted = system.sum_rates(position, tasks=system.mean_tasks(()))[1]
+    unlimited = double(without_fading("random_disk")).sum_rates(position)[1]
+    assert 0.0 < float(admitted) < float(unlimited)

@@ -1,0 +1,48 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hyuav.experiments.run_directory import RunDirectory
+from hyuav.viz.data.reading import readable_config, readable_evaluation, readable_flights
+
+pytest_plugins = "sample_runs"
+
+
+def test_what_is_whole_is_read(evaluated: RunDirectory) -> None:
+    content = json.loads((evaluated.path / "evaluation.json").read_text())
+    assert readable_evaluation(evaluated.path) == content
+    flights = readable_flights(evaluated.path)
+    assert flights is not None
+    assert set(flights["scheme"]) == set(content["schemes"])
+    assert readable_config(evaluated.path)["algorithm"]["name"] == "ddpg"
+
+
+def test_a_missing_file_is_nothing(tmp_path: Path) -> None:
+    assert readable_config(tmp_path) == {}
+    assert readable_evaluation(tmp_path) is None
+    assert readable_flights(tmp_path) is None
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
+def test_a_file_cut_off_is_nothing(share: float, tmp_path: Path, evaluated: RunDirectory) -> None:
+    for name in ("evaluation.json", "flights.parquet"):
+        whole = (evaluated.path / name).read_bytes()
+        (tmp_path / name).write_bytes(whole[: int(share * len(whole))])
+    assert readable_evaluation(tmp_path) is None
+    assert readable_flights(tmp_path) is None
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        [],
+        {"schemes": {}},
+        {"schemes": {"proposed": 3}, "num_slots": 20, "episodes": 4},
+        {"schemes": {"proposed": {"secrecy_sum_rate": {}}}, "num_slots": 20, "episodes": 4},
+    ],
+)
+def test_another_programs_evaluation_is_nothing(content: Any, tmp_path: Path) -> None:
+    (tmp_path / "evaluation.json").write_text(json.dumps(content))
+    assert readable_evaluation(tmp_path) is None

@@ -1,0 +1,26 @@
+import itertools
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageSequence
+
+from hyuav import Scenario
+from hyuav.experiments.evaluation import Evaluation
+from hyuav.viz.paper.animation import animate_flight
+from hyuav.viz.paper.flights import first_flight
+
+
+def test_a_flight_in_motion_has_a_frame_for_the_start_and_each_slot(
+    scenario: Scenario, evaluation: Evaluation, tmp_path: Path
+) -> None:
+    file = tmp_path / "new" / "flight.gif"
+    animate_flight(scenario, first_flight(evaluation.flights, "proposed"), file)
+    with Image.open(file) as gif:
+        frames = [
+            (np.asarray(frame.convert("RGB")), frame.info["duration"])
+            for frame in ImageSequence.Iterator(gif)
+        ]
+    assert len(frames) == scenario.num_slots + 1
+    assert all((one != other).any() for (one, _), (other, _) in itertools.pairwise(frames))
+    assert frames[-1][1] > frames[0][1]
+    assert file.stat().st_size < 500_000

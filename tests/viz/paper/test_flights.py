@@ -1,0 +1,55 @@
+import numpy as np
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from hyuav import Scenario
+from hyuav.experiments.evaluation import Evaluation
+from hyuav.viz.paper import COLORS, flight_map, trajectories
+from hyuav.viz.paper.flights import FLIGHT_PANELS, flight_tables
+
+
+def texts(figure: Figure) -> list[str]:
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+
+
+def test_the_flight_map_shows_every_scheme_that_was_flown(
+    scenario: Scenario, evaluation: Evaluation
+) -> None:
+    figure = flight_map(scenario, evaluation.flights)
+    assert len(figure.axes) == len(FLIGHT_PANELS)
+    assert {"Re-LT", "Ja-LT", "UE", "helper relays", "helper jams"} <= set(texts(figure))
+    assert {"coverage of L", "start", "end"} <= set(texts(figure))
+    assert "Re-OT" not in texts(figure)
+
+
+def test_trajectories_lie_over_the_optimums_flight(
+    scenario: Scenario, evaluation: Evaluation
+) -> None:
+    figure = trajectories(scenario, evaluation.flights)
+    (axes,) = figure.axes
+    best = max(axes.lines, key=lambda line: line.get_linewidth())
+    path = np.asarray(best.get_xydata())
+    assert path[0].tolist() == list(scenario.helper_start)
+    assert len(path) == scenario.num_slots + 1
+    own = [line for line in axes.lines if to_hex(line.get_color()) == COLORS["proposed"].lower()]
+    dots = np.concatenate([line.get_xydata() for line in own if line.get_marker() == "o"])
+    assert {tuple(dot) for dot in dots} == {tuple(place) for place in path[1:]}
+    assert [line.get_marker() for line in own if line.get_marker() in ("D", "*")] == ["D", "*"]
+    assert {"Proposed", "Optimum", "start", "end", "coverage of L"} <= set(texts(figure))
+    assert not {"Re-OT", "Ja-OT", "Re-LT"} & set(texts(figure))
+
+
+def test_the_tables_hold_the_flights_from_the_start_and_all_nodes(
+    scenario: Scenario, evaluation: Evaluation
+) -> None:
+    tables = flight_tables(scenario, evaluation.flights, ["re_lt", "re_ot"])
+    flight = tables[""]
+    assert set(flight["scheme"]) == {"re_lt"}
+    assert flight["slot"].tolist() == list(range(11))
+    assert flight[["x", "y"]].iloc[0].to_list() == list(scenario.helper_start)
+    assert flight["relay"].tolist() == [None] + [True] * 10
+    nodes = tables["nodes"].set_index("node")
+    places = nodes[["x", "y"]].T.to_dict("list")
+    assert places["UE 10"] == list(scenario.ue_positions[9])
+    assert places["E"] == list(scenario.eavesdropper_position)
+    assert nodes["coverage"].dropna().to_dict() == {"L": scenario.coverage_radius}
