@@ -15,6 +15,7 @@ from benchmarks.results import Results
 from benchmarks.tables import print_tables
 from benchmarks.work import Work
 from hyuav import Scenario
+from hyuav._support import machine
 from hyuav._support.errors import InputError
 from hyuav._support.machine import cores
 from recipe_calls import Call, Refusal
@@ -156,13 +157,13 @@ def test_a_mistake_is_answered_by_one_line_and_status_2(
 def test_missing_libraries_are_named_with_the_way_to_get_them(
     refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(plan, "_can_be_found", lambda library: library == "stable_baselines3")
+    monkeypatch.setattr(machine, "_can_be_found", lambda library: library == "stable_baselines3")
     line = "error: sbx, jax cannot be imported: pip install 'hyuav[bench]'\n"
     assert refusal("benchmark", "parts=training") == line
 
 
 def test_only_the_libraries_that_are_measured_are_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plan, "_can_be_found", lambda _: False)
+    monkeypatch.setattr(machine, "_can_be_found", lambda _: False)
     plan.require_peers(("environment",), plan.PEERS)
     plan.require_peers(("training", "job"), ("cleanrl", "torchrl"))
     with pytest.raises(InputError, match="stable_baselines3"):

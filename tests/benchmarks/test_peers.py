@@ -98,7 +98,9 @@ def test_work_survives_the_way_to_its_process() -> None:
 
 def test_the_exploration_noise_decays_from_the_papers_variance() -> None:
     pytest.importorskip("stable_baselines3")
-    noise = importlib.import_module("benchmarks.stable_baselines").DecayingNoise(0.6, 0.999, 0)
+    noise = importlib.import_module("hyuav.experiments.comparison.peer").DecayingNoise(
+        0.6, 0.999, 0
+    )
     draws = np.stack([noise() for _ in range(4000)])
     assert draws[:200].var() == pytest.approx(0.6 * 0.82, rel=0.2)  # mean of 0.998^n
     assert draws[3000:].std() < 0.06

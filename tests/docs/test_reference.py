@@ -75,5 +75,5 @@ def test_what_the_source_says_of_a_field_is_found_in_base_classes_too() -> None:
 
 def test_every_public_module_is_on_one_page_of_the_api_reference() -> None:
     shown = re.findall(r"^::: (\S+)$", "\n".join(pages().values()), flags=re.MULTILINE)
-    assert sorted(shown) == sorted(modules())
+    assert sorted(name for name in shown if "._" not in name) == sorted(modules())
     assert set(pages()) == {"index.md", *(f"{room}.md" for room in ROOMS)}

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks import plan
 from faults import leave_overflowing
+from hyuav._support import machine
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.learning.robust import RobustDDPG
 from recipe_calls import TINY_COMPARISON, Call, Refusal
@@ -231,7 +231,7 @@ def test_a_mistake_is_answered_by_one_line_and_status_2(
 def test_a_missing_library_is_named_with_the_way_to_get_it(
     refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(plan, "_can_be_found", lambda _: False)
+    monkeypatch.setattr(machine, "_can_be_found", lambda _: False)
     line = "error: stable_baselines3 cannot be imported: pip install 'hyuav[bench]'\n"
     assert refusal("compare", "algorithm=[ddpg,stable_baselines3]", *TINY_COMPARISON) == line
 
