@@ -14,8 +14,8 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from hyuav._support.durable import write_durably
 from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.files import write_durably
 from hyuav._support.parameters import Parameters, count, number, parameter
 from hyuav._support.randomness import derived_seed
 from hyuav.envs.transforms import make_env

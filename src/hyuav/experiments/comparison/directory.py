@@ -10,8 +10,8 @@ from typing import Any
 import pandas as pd
 from omegaconf import OmegaConf
 
-from hyuav._support.durable import create_durably, write_durably
 from hyuav._support.errors import InputError, rejection
+from hyuav._support.files import create_durably, write_durably
 from hyuav._support.parameters import read_yaml
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import PLAIN, Compare, parameters_of, training_episodes

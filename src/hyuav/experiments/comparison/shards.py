@@ -10,14 +10,14 @@ import numpy as np
 import pandas as pd
 from rich.console import Console
 
-from hyuav._support.durable import rename_durably, write_durably
 from hyuav._support.errors import BusyError, Halted, InputError, rejection
-from hyuav._support.files import read_parquet
+from hyuav._support.files import read_parquet, rename_durably, write_durably
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import training_episodes
 from hyuav.experiments.evaluation import OPTIMA, EvaluationParameters, fly
 from hyuav.experiments.experiment import LEARNED, learned_policies, resume, train
-from hyuav.experiments.run_directory import METRIC_NUMBERS, RunConfiguration, RunDirectory
+from hyuav.experiments.metrics import METRIC_NUMBERS
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, in_group
 from hyuav.learning.registry import PEER
 

@@ -17,9 +17,8 @@ from typing import Any, Self
 import wandb
 from rich.console import Console
 
-from hyuav._support.durable import write_durably
 from hyuav._support.errors import harmless
-from hyuav._support.files import read_regular
+from hyuav._support.files import read_regular, write_durably
 from hyuav._support.terminal import print_line
 from hyuav.experiments.tracking.parameters import LoggerParameters, identifier
 

@@ -17,7 +17,8 @@ from hyuav.experiments.evaluation import (
     evaluate,
 )
 from hyuav.experiments.experiment import LEARNED, LEARNED_AS_IN_PAPER, LINEAR, learned_policies
-from hyuav.experiments.run_directory import RunDirectory, named_scenario, readable_metrics
+from hyuav.experiments.metrics import readable_metrics
+from hyuav.experiments.run_directory import RunDirectory, named_scenario
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.reading import readable_config, readable_evaluation, readable_flights
 from hyuav.viz.html.curves import MAX_POINTS, QUANTITIES, learning_figure

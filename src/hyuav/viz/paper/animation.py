@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from hyuav._support.durable import write_durably
+from hyuav._support.files import write_durably
 from hyuav.envs.rendering import (
     UE_COLOR,
     draw_coverage,
