@@ -11,9 +11,10 @@ from rich.console import Console
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
-from hyuav.experiments.experiment import learned_policies, reference_policies, train
+from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.experiments.train import train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters

@@ -8,16 +8,11 @@ from rich.console import Console
 
 from hyuav import InputError, Scenario
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
-from hyuav.experiments.experiment import (
-    learned_policies,
-    reference_policies,
-    resume,
-    saved_weights,
-    select_initial_weights,
-    train,
-)
+from hyuav.experiments.initial_weights import saved_weights, select_initial_weights
+from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.experiments.train import resume, train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import Training, TrainingParameters

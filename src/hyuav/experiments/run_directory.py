@@ -23,7 +23,7 @@ from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.training import TrainingParameters
+from hyuav.learning.training import Training, TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
 
 REPORT_FILE = "report.html"
@@ -69,6 +69,14 @@ class RunConfiguration:
             "algorithm": {"name": self.algorithm_name, **self.algorithm.to_dict()},
             "training": self.training.to_dict(),
         }
+
+    def new_training(self, device: str | None = None) -> Training:
+        """The training that is configured, of which nothing is done yet.
+
+        Raises:
+            InputError: as :class:`hyuav.learning.training.Training`.
+        """
+        return Training(self.scenario, self.learners, self.algorithm, self.training, device)
 
 
 def _learner(name: str, value: object) -> Learner:

@@ -14,11 +14,13 @@ from hyuav._support.errors import BusyError, Halted, InputError, rejection
 from hyuav._support.files import read_parquet, rename_durably, write_durably
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import training_episodes
-from hyuav.experiments.evaluation import OPTIMA, EvaluationParameters, fly
-from hyuav.experiments.experiment import LEARNED, learned_policies, resume, train
+from hyuav.experiments.evaluation import EvaluationParameters, fly
 from hyuav.experiments.metrics import METRIC_NUMBERS
+from hyuav.experiments.policies import learned_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.schemes import LEARNED, OPTIMA
 from hyuav.experiments.tracking import LoggerParameters, in_group
+from hyuav.experiments.train import resume, train
 from hyuav.learning.registry import PEER
 
 TABLES = RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"

@@ -14,8 +14,8 @@ from torch import Tensor, nn
 from hyuav.experiments.comparison.peer import ddpg_model
 from hyuav.experiments.comparison.plan import training_episodes
 from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
-from hyuav.experiments.experiment import LEARNED
 from hyuav.experiments.run_directory import RunConfiguration
+from hyuav.experiments.schemes import LEARNED
 from hyuav.learning.cohort import Learner
 from hyuav.physics.scenario import Scenario
 

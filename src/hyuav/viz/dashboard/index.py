@@ -15,9 +15,10 @@ import yaml
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import YAML_LOADER, require_plain_yaml
-from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, OPTIMA
+from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.experiments.metrics import GrowingMetrics, last_metrics
 from hyuav.experiments.run_directory import RunDirectory
+from hyuav.experiments.schemes import OPTIMA
 
 RUNNING_SECONDS = 120.0
 """A training that wrote nothing for longer counts as stopped."""

@@ -22,7 +22,7 @@ from hyuav.envs.rendering import (
     draw_flight,
     draw_scenario,
 )
-from hyuav.experiments.evaluation import LABELS
+from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import Point, Scenario
 from hyuav.viz.paper.flights import path_of
 from hyuav.viz.paper.maps import MODE_COLORS
