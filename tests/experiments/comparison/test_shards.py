@@ -15,7 +15,7 @@ from hyuav import Scenario
 from hyuav._support.errors import BusyError, InputError
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import parameters_of, training_episodes
-from hyuav.experiments.comparison.shards import Shard, tables
+from hyuav.experiments.comparison.shards import Shard
 from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, Tracker
@@ -93,7 +93,7 @@ def test_learners_are_set_beside_the_optimum(optima: Optima, tmp_path: Path) -> 
             for learner in range(4)
         ]
     )
-    results, curves = tables(work, metrics, [1.0, 2.0, 3.0, 4.0])
+    results, curves = work.tables(metrics, [1.0, 2.0, 3.0, 4.0])
     assert results["scheme"].tolist() == ["relay", "relay", "hybrid", "hybrid"]
     assert results["seed"].tolist() == [3, 4, 3, 4]
     assert results["sum_rate"].tolist() == [1.0, 2.0, 3.0, 4.0]

@@ -55,8 +55,8 @@ def train(
         evaluation: of each learner's best weights.
 
     Returns:
-        a row for each evaluation and learner, as :func:`.shards.tables` takes them, and what each
-        learner's best weights earn in bps/Hz.
+        a row for each evaluation and learner, as :meth:`.shards.Shard.tables` takes them, and what
+        each learner's best weights earn in bps/Hz.
     """
     rows, sum_rates = [], []
     for index, learner in enumerate(configuration.learners):

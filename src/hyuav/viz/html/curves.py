@@ -184,7 +184,7 @@ def comparison_figures(
     """The figures of a comparison, by their titles.
 
     Args:
-        results: a row per learner, as :class:`.comparison.directory.Summary` holds them.
+        results: a row per learner, as :class:`.comparison.summary.Summary` holds them.
         curves: a row per evaluation in training, likewise.
         cells: a row per algorithm, scenario, scheme and horizon, likewise.
         threshold: share of the optimum that counts as solved, drawn as a line.
