@@ -4,7 +4,8 @@ import torch
 
 from benchmarks.work import Work
 from hyuav.experiments.evaluation import EvaluationParameters, Policy, evaluate
-from hyuav.experiments.experiment import LEARNED, LINEAR
+from hyuav.experiments.policies import straight_policies
+from hyuav.experiments.schemes import LEARNED
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.weights import copy_weights, draw_weights
@@ -29,9 +30,8 @@ class FiveSchemes:
         loss = algorithm.build(1, scenario).loss
         draw_weights(loss, [work.seed], "weights")
         actor = LearnedPolicy(scenario, algorithm, copy_weights(loss), [0])
-        self.policies = {name: [Policy(actor)] for name in LEARNED.values()} | {
-            name: [Policy(make(scenario))] for name, make in LINEAR.items()
-        }
+        straight, _ = straight_policies(scenario)
+        self.policies = {name: [Policy(actor)] for name in LEARNED.values()} | straight
 
     def advance(self) -> int:
         """Evaluate all of them once."""

@@ -10,7 +10,7 @@ import pandas as pd
 from benchmarks.arithmetic import update_flops
 from benchmarks.measure import Row
 from benchmarks.work import Work
-from hyuav._support.durable import write_durably
+from hyuav._support.files import write_durably
 
 IDENTITY = ["part", "entry", "device", "learners", "helpers", "num_ues", "num_slots", "threads"]
 """Columns in which measurements of the same thing agree; they differ in the round."""

@@ -34,7 +34,7 @@ from hyuav.experiments.evaluation import (
     evaluate,
 )
 from hyuav.experiments.evaluation_table import print_results
-from hyuav.experiments.experiment import learned_policies, reference_policies
+from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunDirectory, require_writable
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
 from hyuav.viz.html.page import write_run_report

@@ -36,15 +36,12 @@ from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
 from hyuav.experiments.evaluation_table import print_results
-from hyuav.experiments.experiment import (
-    LEARNED_AS_IN_PAPER,
-    learned_policies,
-    reference_policies,
-    select_initial_weights,
-    train_or_resume,
-)
+from hyuav.experiments.initial_weights import select_initial_weights
+from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
 from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
+from hyuav.experiments.train import train_or_resume
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters

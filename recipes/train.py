@@ -35,9 +35,10 @@ from hyuav.experiments.configuration import (
     section,
     telling_how_to_go_on,
 )
-from hyuav.experiments.experiment import resume, saved_weights, train_or_resume
+from hyuav.experiments.initial_weights import saved_weights
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.experiments.train import resume, train_or_resume
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.slot import SCHEMES

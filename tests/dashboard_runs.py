@@ -5,7 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hyuav import Scenario
-from hyuav.experiments.run_directory import METRIC_COLUMNS, RunConfiguration, RunDirectory
+from hyuav.experiments.metrics import METRIC_COLUMNS
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters

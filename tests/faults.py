@@ -13,7 +13,6 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hyuav.experiments.experiment import new_training
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, Tracker
 
@@ -105,7 +104,7 @@ def leave_overflowing(
         flown: episodes before it was interrupted.
         learners: whose critics they are.
     """
-    training = new_training(configuration)
+    training = configuration.new_training()
     run = RunDirectory.create(directory, configuration)
     silent = LoggerParameters(mode="disabled"), Console(quiet=True)
     with Tracker(run, configuration, training, *silent) as tracker:

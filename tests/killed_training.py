@@ -12,9 +12,9 @@ import torch
 from rich.console import Console
 
 from hyuav import Scenario
-from hyuav.experiments.experiment import resume, train
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.experiments.train import resume, train
 from hyuav.learning.checkpoint import load_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.robust import RobustDDPG

@@ -11,15 +11,26 @@ from rich.console import Console
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
-from hyuav.experiments.experiment import learned_policies, reference_policies, train
+from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.experiments.train import train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=12)
-SILENT = Console(file=io.StringIO())
+SILENT, UNLOGGED = Console(file=io.StringIO()), LoggerParameters(mode="disabled")
+
+ONE_OF_EACH = RunConfiguration(
+    "two_clusters",
+    dataclasses.replace(SCENARIO, num_slots=10),
+    (Learner("hybrid", 3), Learner("relay", 3), Learner("jamming", 3)),
+    "ddpg",
+    DDPG(hidden_sizes=(16,)),
+    TrainingParameters(num_episodes=4, batch_size=8, evaluation_every=2, evaluation_episodes=300),
+)
+"""A learner for each mode rule."""
 
 
 @pytest.fixture(scope="session")
@@ -40,7 +51,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
         ),
     )
     directory = tmp_path_factory.mktemp("trained") / "small run"
-    return train(directory, configuration, LoggerParameters(mode="disabled"), SILENT)
+    return train(directory, configuration, UNLOGGED, SILENT)
 
 
 @pytest.fixture(scope="session")

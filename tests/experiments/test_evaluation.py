@@ -11,9 +11,6 @@ from scipy import stats
 from batches import TEN_UES
 from hyuav import InputError, Scenario
 from hyuav.experiments.evaluation import (
-    LABELS,
-    MODE_RULES,
-    OPTIMA,
     EvaluationParameters,
     Policy,
     confidence_interval,
@@ -21,6 +18,7 @@ from hyuav.experiments.evaluation import (
     fly,
     secrecy_sum_rate,
 )
+from hyuav.experiments.schemes import LABELS, OPTIMA
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.weights import copy_weights
@@ -153,11 +151,6 @@ def test_the_interval_of_several_learners_speaks_of_the_learners() -> None:
 
 def test_the_interval_of_a_flight_without_fading_is_its_value() -> None:
     assert confidence_interval(np.full((1, 10), 7.0)) == [7.0, 7.0]
-
-
-def test_every_scheme_has_a_label_a_mode_rule_and_an_optimum() -> None:
-    assert set(LABELS) == set(MODE_RULES)
-    assert {OPTIMA[rule] for rule in MODE_RULES.values()} <= set(LABELS)
 
 
 def test_an_unknown_scheme_or_none_is_refused() -> None:

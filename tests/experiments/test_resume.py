@@ -17,9 +17,9 @@ from rich.console import Console
 from faults import small_disk
 from hyuav import InputError
 from hyuav._support.errors import Halted
-from hyuav.experiments.experiment import new_training, resume, train, train_or_resume
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import first_checkpoint
+from hyuav.experiments.train import resume, train, train_or_resume
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from killed_training import OFF, differences, outcome, small
 
@@ -80,7 +80,7 @@ def test_a_training_that_only_began_goes_on_from_its_initial_weights(
     tmp_path: Path, unbroken: Path
 ) -> None:
     configuration = every_episode(6)
-    start = new_training(configuration)
+    start = configuration.new_training()
     run = RunDirectory.create(tmp_path / "run", configuration, None, first_checkpoint(start))
     resume(run.path, OFF, SILENT)
     assert differences(outcome(run.path), outcome(unbroken)) == []
@@ -319,7 +319,7 @@ def test_a_learner_without_finite_numbers_stops_and_the_others_do_not_notice(
 ) -> None:
     """Its critic begins with weights so large that the square of its loss is beyond a float."""
     configuration = every_episode(6)
-    weights = new_training(configuration).best_weights
+    weights = configuration.new_training().best_weights
     healthy = train(tmp_path / "whole", configuration, OFF, SILENT, initial_weights=weights)
     for name, values in weights.items():
         if "value_network" in name:
@@ -359,7 +359,7 @@ def test_a_training_halts_when_no_learner_is_left(tmp_path: Path) -> None:
 def test_pytorchs_own_generator_is_not_drawn_from(run: RunDirectory) -> None:
     """Which is why no checkpoint holds its state."""
     configuration = run.configuration()
-    training = new_training(configuration)
+    training = configuration.new_training()
     before = torch.get_rng_state()
     list(training.episodes())
     assert torch.equal(torch.get_rng_state(), before)

@@ -23,9 +23,11 @@ from torch import Tensor
 from hostile import CASES, TRIED, anything, attempt, fuzz, mutated, texts
 from hyuav import InputError, Scenario
 from hyuav._support.errors import Halted
-from hyuav.experiments.experiment import learned_policy, resume, saved_weights, train
+from hyuav.experiments.initial_weights import saved_weights
+from hyuav.experiments.policies import learned_policy
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.experiments.train import resume, train
 from hyuav.learning.checkpoint import FORMAT, load_checkpoint, save_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG

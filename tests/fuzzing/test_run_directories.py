@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from hostile import CASES, PAYLOADS, TRIED, anything, attempt, fuzz, mutated, numbers, texts
 from hyuav import InputError, Scenario
-from hyuav.experiments.experiment import learned_policies
-from hyuav.experiments.run_directory import RunDirectory, readable_metrics
+from hyuav.experiments.metrics import GrowingMetrics, readable_metrics
+from hyuav.experiments.policies import learned_policies
+from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.dashboard import curves, tables
 from hyuav.viz.dashboard.flights_page import read_flights
-from hyuav.viz.dashboard.growing import GrowingMetrics
 from hyuav.viz.dashboard.index import RunIndex
 from hyuav.viz.data.reading import readable_evaluation, readable_flights
 from hyuav.viz.html.curves import learning_figure

@@ -1,4 +1,4 @@
-"""Multiruns of a recipe: on this machine, by submitit, and on a Ray."""
+"""Multiruns of a recipe: on this machine, and by submitit."""
 
 import signal
 import subprocess
@@ -10,8 +10,9 @@ import pandas as pd
 import psutil
 import pytest
 
-from hyuav.experiments.run_directory import RunDirectory, readable_metrics
-from recipe_calls import TINY, Call, Refusal
+from hyuav.experiments.metrics import readable_metrics
+from hyuav.experiments.run_directory import RunDirectory
+from recipe_calls import TINY, Call
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 
@@ -51,29 +52,10 @@ def test_a_job_with_a_mistake_is_named_and_stops_no_other(
     assert [run.name for run in runs(tmp_path)] == ["1_two_clusters_ddpg_0"]
 
 
-def test_the_launcher_of_ray_is_asked_for_with_its_extra(
-    refusal: Refusal, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "ray", None)
-    line = "error: ray cannot be imported: pip install 'hyuav[cluster]'\n"
-    assert refusal("train", "-m", "seed=0,1", "hydra/launcher=ray", *SHORT) == line
-
-
-def test_the_launcher_of_ray_does_not_wait_where_nobody_answers(refusal: Refusal) -> None:
-    pytest.importorskip("ray")
-    launcher = ("hydra/launcher=ray", "hydra.launcher.address=127.0.0.1:1")
-    line = refusal("train", "-m", "seed=0,1", *launcher, *SHORT)
-    assert line.startswith("error: address = '127.0.0.1:1': expected local, auto or HOST:PORT")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("library", "launcher"),
-    [("ray", "ray"), ("hydra_plugins.hydra_submitit_launcher", "submitit_local")],
-)
-def test_a_launcher_trains_the_same(tmp_path: Path, library: str, launcher: str) -> None:
-    pytest.importorskip(library)
-    for name, arguments in {"here": [], "there": [f"hydra/launcher={launcher}"]}.items():
+def test_submitit_trains_the_same(tmp_path: Path) -> None:
+    pytest.importorskip("hydra_plugins.hydra_submitit_launcher")
+    for name, arguments in {"here": [], "there": ["hydra/launcher=submitit_local"]}.items():
         (tmp_path / name).mkdir()
         command = [sys.executable, str(RECIPES / "train.py"), "-m", "seed=0,1"]
         command += ["algorithm=ddpg,td3", *SHORT, *arguments]
@@ -137,20 +119,3 @@ def test_a_job_that_is_taken_away_and_put_back_into_the_queue_goes_on(tmp_path: 
         assert episodes(run) == list(range(1, EPISODES + 1))
     logs = [file.read_text() for file in (tmp_path / "sweep" / ".submitit").rglob("*.out")]
     assert sum("this training goes on after episode " in log for log in logs) == 1
-
-
-@pytest.mark.slow
-def test_a_lost_worker_of_ray_is_named_and_stops_no_other_job(tmp_path: Path) -> None:
-    pytest.importorskip("ray")
-    lost, other = (tmp_path / "sweep" / f"{seed}_two_clusters_ddpg_{seed}" for seed in (0, 1))
-    sweep = begin(tmp_path, "hydra/launcher=ray", "hydra.launcher.workers=2")
-    for run in (lost, other):
-        wait_for_episode(5, run, sweep)
-    worker(lost, sweep).kill()
-    _, said = sweep.communicate(timeout=600)
-    assert sweep.returncode == 2
-    (job,) = (line for line in said.splitlines() if line.startswith("Error executing job"))
-    assert "'seed=0'" in job
-    assert said.splitlines()[-1] == "error: its worker was lost"
-    assert len(episodes(lost)) < EPISODES
-    assert episodes(other) == list(range(1, EPISODES + 1))

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from hyuav.experiments.run_directory import RunDirectory, readable_metrics
+from hyuav.experiments.metrics import readable_metrics
+from hyuav.experiments.run_directory import RunDirectory
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 

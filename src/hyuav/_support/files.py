@@ -1,8 +1,15 @@
-"""Reading files of unknown origin: a pipe would be waited for, and a device may have no end."""
+"""Files that are read whatever they are, and are written whole or stay as they were.
 
+What is read may be of unknown origin: a pipe would be waited for, and a device may have no end.
+"""
+
+import contextlib
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 
@@ -62,3 +69,99 @@ def read_parquet(path: Path, accepted: str, columns: list[str] | None = None) ->
     except (OSError, ValueError, TypeError, LookupError, ArrowException) as error:
         reason = one_line(str(error))[:200]
         raise InputError(f"{path}: expected {accepted} in Parquet ({reason})") from None
+
+
+def write_all(file: FileIO, content: bytes | memoryview) -> None:
+    """Write to an unbuffered file until nothing is left, or the system refuses.
+
+    Raises:
+        OSError: with the file's name, such as for want of space.
+    """
+    left = memoryview(content)
+    try:
+        while left:
+            left = left[file.write(left) :]
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(file.name)) from None
+
+
+def sync(file: FileIO) -> None:
+    """Return when what was written to the file outlasts a loss of power."""
+    os.fsync(file.fileno())
+
+
+def write_durably(path: Path, content: bytes | memoryview, keep: Path | None = None) -> None:
+    """Replace a file by another content in one step, which a loss of power outlasts.
+
+    Args:
+        path: of the file.
+        content: of it.
+        keep: where the file that is replaced goes to; it is lost where this is None.
+
+    Raises:
+        OSError: it cannot be written; then what was there still is.
+    """
+    with _written_beside(path, content) as partial:
+        if keep is not None and path.exists():
+            path.replace(keep)
+        partial.replace(path)
+
+
+def create_durably(path: Path, content: bytes) -> None:
+    """Make a file that was not there, whole from the first moment.
+
+    Raises:
+        FileExistsError: there is one.
+        OSError: it cannot be written.
+    """
+    if path.exists():
+        raise FileExistsError(str(path))
+    with _written_beside(path, content) as partial:
+        try:
+            path.hardlink_to(partial)  # which never replaces another's
+        except FileExistsError:
+            raise
+        except OSError:  # where there are no links
+            partial.replace(path)
+
+
+@contextmanager
+def _written_beside(path: Path, content: bytes | memoryview) -> Iterator[Path]:
+    """A file of this content beside ``path``, to be given that name; it is removed otherwise.
+
+    Raises:
+        OSError: in which the file is called ``path``.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.partial")
+    try:
+        with partial.open("wb", buffering=0) as file:
+            write_all(file, content)
+            sync(file)
+        yield partial
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    finally:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+    _sync_directory(path.parent)
+
+
+def rename_durably(directory: Path, to: Path) -> None:
+    """Rename a directory whose files are synced; its name outlasts a loss of power.
+
+    Raises:
+        OSError: it cannot be renamed.
+    """
+    directory.rename(to)
+    _sync_directory(to.parent)
+
+
+def _sync_directory(directory: Path) -> None:
+    """Let names outlast a loss of power, where the system can do this for a directory."""
+    with contextlib.suppress(OSError):
+        number = os.open(directory, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)

@@ -14,53 +14,18 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from hyuav._support.durable import write_durably
 from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.files import write_durably
 from hyuav._support.parameters import Parameters, count, number, parameter
 from hyuav._support.randomness import derived_seed
 from hyuav.envs.transforms import make_env
+from hyuav.experiments.schemes import SCHEMES
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import RESOLUTION
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 EVALUATION_FILE, FLIGHTS_FILE = "evaluation.json", "flights.parquet"
-
-LABELS = {
-    "proposed": "Proposed",
-    "proposed_paper": "Paper Proposed",
-    "ja_ot": "Ja-OT",
-    "ja_ot_paper": "Paper Ja-OT",
-    "re_ot": "Re-OT",
-    "re_ot_paper": "Paper Re-OT",
-    "re_lt": "Re-LT",
-    "ja_lt": "Ja-LT",
-    "optimum": "Optimum",
-    "ja_optimum": "Ja-optimum",
-    "re_optimum": "Re-optimum",
-}
-"""The schemes in the order of the table, with the names that the paper gives them.
-
-Those that are learned by the paper's own algorithm, where another one is beside it, say so.
-"""
-
-MODE_RULES = {
-    "proposed": "hybrid",
-    "proposed_paper": "hybrid",
-    "optimum": "hybrid",
-    "ja_ot": "jamming",
-    "ja_ot_paper": "jamming",
-    "ja_lt": "jamming",
-    "ja_optimum": "jamming",
-    "re_ot": "relay",
-    "re_ot_paper": "relay",
-    "re_lt": "relay",
-    "re_optimum": "relay",
-}
-"""Who chooses the helper's mode in each scheme, a name of :data:`hyuav.physics.slot.SCHEMES`."""
-
-OPTIMA = {"hybrid": "optimum", "jamming": "ja_optimum", "relay": "re_optimum"}
-"""The optimum that a scheme with this mode rule is measured against."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +86,7 @@ def evaluate(
     Args:
         scenario: node positions and parameters.
         name: of the scenario, for the record.
-        policies: by scheme, names of :data:`LABELS`: one or more, as from several seeds.
+        policies: by scheme, names of :data:`.schemes.SCHEMES`: one or more, as from several seeds.
             Fractions of the optimum are given where the optima are among them.
         parameters: how many episodes, how many of them kept slot by slot, and the seed.
         device: to fly on.
@@ -131,7 +96,7 @@ def evaluate(
         InputError: no scheme, an unknown one, or one without a policy.
     """
     for scheme, several in policies.items():
-        require_choice("scheme", scheme, LABELS)
+        require_choice("scheme", scheme, SCHEMES)
         if not several:
             raise InputError(rejection(f"policies[{scheme!r}]", several, "at least one policy"))
     if not policies:
@@ -140,7 +105,7 @@ def evaluate(
         scheme: _together(
             [fly(scenario, scheme, policy, parameters, device) for policy in policies[scheme]]
         )
-        for scheme in track([scheme for scheme in LABELS if scheme in policies])
+        for scheme in track([scheme for scheme in SCHEMES if scheme in policies])
     }
     returns = {
         scheme: flights.totals["secrecy_sum_rate"].numpy() for scheme, flights in flown.items()
@@ -184,7 +149,7 @@ def fly(
     seeds = [derived_seed(parameters.seed, "evaluation")] * policy.learners
     env = make_env(
         scenario,
-        MODE_RULES[scheme],
+        SCHEMES[scheme].mode_rule,
         batch_size,
         device,
         seeds,
@@ -242,7 +207,7 @@ def _returns(returns: Mapping[str, Array], scheme: str) -> dict[str, Any]:
         "secrecy_sum_rate": {"mean": mean, "ci95": confidence_interval(own)},
     }
     for field, optimum in (
-        ("fraction_of_optimum", OPTIMA[MODE_RULES[scheme]]),
+        ("fraction_of_optimum", SCHEMES[scheme].optimum),
         ("fraction_of_hybrid_optimum", "optimum"),
     ):
         if optimum in returns and returns[optimum].mean() > 0:

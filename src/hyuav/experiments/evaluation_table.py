@@ -4,7 +4,8 @@ from rich.console import Console
 
 from hyuav._support.errors import harmless
 from hyuav._support.terminal import print_table, results_table
-from hyuav.experiments.evaluation import LABELS, Evaluation
+from hyuav.experiments.evaluation import Evaluation
+from hyuav.experiments.schemes import LABELS
 
 
 def print_results(evaluation: Evaluation, console: Console) -> None:

@@ -15,41 +15,18 @@ import pandas as pd
 from omegaconf import OmegaConf
 from torch import Tensor
 
-from hyuav._support.durable import create_durably
 from hyuav._support.errors import BusyError, InputError, rejection, require_choice
-from hyuav._support.files import open_regular, read_regular
+from hyuav._support.files import create_durably
 from hyuav._support.parameters import mapping, read_yaml, sequence
-from hyuav.experiments.metrics import IDENTITY, parse_rows
+from hyuav.experiments.metrics import read_metrics
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.training import TrainingParameters
+from hyuav.learning.training import Training, TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
-from hyuav.physics.slot import SCHEMES
 
 REPORT_FILE = "report.html"
-
-METRIC_COLUMNS = (
-    "episode",
-    "slots",
-    "learner",
-    "scheme",
-    "seed",
-    "num_slots",
-    "accumulated_reward",
-    "evaluation",
-    "sum_rate",
-    "best_evaluation",
-    "seconds",
-)
-"""Columns of ``metrics.csv``; the mean loss of each gradient step follows.
-
-``evaluation`` is noise-free, ``sum_rate`` the same without the off-map penalty.
-"""
-
-METRIC_NUMBERS = frozenset(METRIC_COLUMNS) - {"scheme"}
-"""Those of them that hold numbers."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +69,14 @@ class RunConfiguration:
             "algorithm": {"name": self.algorithm_name, **self.algorithm.to_dict()},
             "training": self.training.to_dict(),
         }
+
+    def new_training(self, device: str | None = None) -> Training:
+        """The training that is configured, of which nothing is done yet.
+
+        Raises:
+            InputError: as :class:`hyuav.learning.training.Training`.
+        """
+        return Training(self.scenario, self.learners, self.algorithm, self.training, device)
 
 
 def _learner(name: str, value: object) -> Learner:
@@ -265,45 +250,5 @@ class RunDirectory:
         return load_weights_file(self.best_checkpoint)
 
     def metrics(self) -> pd.DataFrame:
-        """What training brought, a row per episode and learner.
-
-        Raises:
-            InputError: there is no such table, or it is damaged.
-        """
-        try:
-            with open_regular(self.metrics_file) as file:
-                metrics = pd.read_csv(file)
-            whole = set(METRIC_COLUMNS) <= set(metrics.columns) and (
-                metrics.empty
-                or (
-                    set(metrics.select_dtypes("number")) >= METRIC_NUMBERS  # truth values are none
-                    and metrics["scheme"].isin(SCHEMES).all()
-                )
-            )
-            reason = "" if whole else "damaged"
-        except (OSError, ValueError) as error:
-            reason = (error.strerror if isinstance(error, OSError) else "") or "damaged"
-        if reason:
-            accepted = f"the table that a training writes ({reason})"
-            raise InputError(rejection("metrics", str(self.metrics_file), accepted))
-        return metrics
-
-
-def readable_metrics(path: str | Path) -> pd.DataFrame:
-    """What can be read of a ``metrics.csv``, also while it is being written.
-
-    A file that is missing or empty has no rows; a row cut off in the middle, or damaged, is left
-    out. Every column of :data:`METRIC_COLUMNS` is there, all finite or NaN but ``scheme``.
-
-    Args:
-        path: of the file.
-    """
-    try:
-        content = read_regular(Path(path))
-    except OSError:
-        content = b""
-    header, _, lines = content[: content.rfind(b"\n") + 1].partition(b"\n")
-    columns = header.decode("utf-8", "replace").strip().split(",")
-    told = set(IDENTITY) <= set(columns)
-    rows = parse_rows(lines, columns) if told else parse_rows(b"", METRIC_COLUMNS)
-    return rows.reindex(columns=list(dict.fromkeys([*METRIC_COLUMNS, *rows.columns])))
+        """What training brought, as :func:`hyuav.experiments.metrics.read_metrics` reads it."""
+        return read_metrics(self.metrics_file)

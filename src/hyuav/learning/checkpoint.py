@@ -8,9 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from hyuav._support.durable import write_durably
 from hyuav._support.errors import InputError, brief, rejection
-from hyuav._support.files import read_regular
+from hyuav._support.files import read_regular, write_durably
 
 FORMAT = "hyuav-checkpoint-1"
 

@@ -15,11 +15,11 @@ from hyuav import Scenario
 from hyuav._support.errors import BusyError, InputError
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import parameters_of, training_episodes
-from hyuav.experiments.comparison.shards import Shard, tables
+from hyuav.experiments.comparison.shards import Shard
 from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
-from hyuav.experiments.experiment import new_training, train
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, Tracker
+from hyuav.experiments.train import train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.registry import PEER
@@ -93,7 +93,7 @@ def test_learners_are_set_beside_the_optimum(optima: Optima, tmp_path: Path) -> 
             for learner in range(4)
         ]
     )
-    results, curves = tables(work, metrics, [1.0, 2.0, 3.0, 4.0])
+    results, curves = work.tables(metrics, [1.0, 2.0, 3.0, 4.0])
     assert results["scheme"].tolist() == ["relay", "relay", "hybrid", "hybrid"]
     assert results["seed"].tolist() == [3, 4, 3, 4]
     assert results["sum_rate"].tolist() == [1.0, 2.0, 3.0, 4.0]
@@ -173,7 +173,7 @@ def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: 
     whole.run()
     run = RunDirectory.create(tmp_path / "broken/ddpg_campus_T6.partial", broken.configuration)
     configuration = broken.configuration
-    training = new_training(configuration)
+    training = configuration.new_training()
     with Tracker(run, configuration, training, broken.logger, Console(quiet=True)) as tracker:
         for episode in training.episodes():
             tracker.log(episode)

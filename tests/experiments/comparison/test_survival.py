@@ -14,7 +14,7 @@ import pytest
 
 pytestmark = pytest.mark.slow
 
-RECIPE = Path(__file__).parents[2] / "recipes" / "compare.py"
+RECIPE = Path(__file__).parents[3] / "recipes" / "compare.py"
 ASKED = [
     "algorithm=[ddpg,sac]",
     "scenario=two_clusters",

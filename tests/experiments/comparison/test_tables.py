@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from hyuav.experiments.comparison.directory import Summary
 from hyuav.experiments.comparison.statistics import (
     improvements,
     summarize_algorithms,
     summarize_cells,
 )
+from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.comparison.tables import label, print_tables
 
 

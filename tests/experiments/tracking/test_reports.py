@@ -9,9 +9,9 @@ from rich.console import Console
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
-from hyuav.experiments.experiment import train
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import EvaluationLoggerParameters, LoggerParameters, log_evaluation
+from hyuav.experiments.train import train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters

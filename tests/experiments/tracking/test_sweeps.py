@@ -20,7 +20,7 @@ from hyuav.learning.registry import ALGORITHMS
 from offline_wandb import offline_runs, recorded, summary
 from recipe_calls import TINY
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SWEEPS = sorted((ROOT / "sweeps").glob("*.yaml"))
 SHORT = [*TINY, "scenario.num_slots=4", "learners=1", "logger.mode=offline"]
 

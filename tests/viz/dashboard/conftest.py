@@ -10,8 +10,9 @@ from rich.console import Console
 
 from dashboard_runs import SCENARIO, WriteRun, configuration, write_run
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
-from hyuav.experiments.experiment import learned_policies, reference_policies, train
+from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.experiments.train import train
 
 
 @pytest.fixture(scope="session")

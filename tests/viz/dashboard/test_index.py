@@ -66,7 +66,7 @@ def test_as_many_runs_as_can_be_drawn_are_parsed_once(
         parsed.append(lines)
         return parse_rows(lines, columns)
 
-    monkeypatch.setattr("hyuav.viz.dashboard.growing.parse_rows", parse)
+    monkeypatch.setattr("hyuav.experiments.metrics.parse_rows", parse)
     index = RunIndex(tmp_path / "runs")
     first = [index.metrics(name) for name in names]
     assert len(parsed) == MOST_DRAWN

@@ -13,8 +13,9 @@ from playwright.sync_api import Page
 from browser import DESKTOP, PHONE, browser_page, needs_chromium
 from hyuav.experiments.comparison.plan import PIECES
 from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
-from hyuav.experiments.evaluation import LABELS
-from hyuav.experiments.run_directory import METRIC_COLUMNS, RunDirectory
+from hyuav.experiments.metrics import METRIC_COLUMNS
+from hyuav.experiments.run_directory import RunDirectory
+from hyuav.experiments.schemes import LABELS
 from hyuav.viz.data.reading import readable_flights
 from hyuav.viz.html.page import write_comparison_report, write_report
 from recipe_calls import TINY_COMPARISON, Call

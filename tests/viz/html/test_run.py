@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
-from hyuav.experiments.experiment import reference_policies
+from hyuav.experiments.policies import reference_policies
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.html.html import Page, Section
 from hyuav.viz.html.run import run_page

@@ -11,9 +11,9 @@ from rich.console import Console
 
 from hyuav import InputError, Scenario
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.experiments.experiment import train
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.experiments.train import train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters

@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,19 +9,13 @@ from typing import Any
 import pandas as pd
 from omegaconf import OmegaConf
 
-from hyuav._support.durable import create_durably, write_durably
 from hyuav._support.errors import InputError, rejection
+from hyuav._support.files import create_durably
 from hyuav._support.parameters import read_yaml
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import PLAIN, Compare, parameters_of, training_episodes
 from hyuav.experiments.comparison.shards import Shard
-from hyuav.experiments.comparison.statistics import (
-    LAYOUTS,
-    improvements,
-    in_cells,
-    summarize_algorithms,
-    summarize_cells,
-)
+from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.configuration import Config
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.experiments.run_directory import RunConfiguration, require_writable
@@ -33,42 +26,6 @@ from hyuav.references.optimum import require_resolution
 
 WORKING = ("workers", "engine", "address", "retries", "output", "logger", "training.cohorts")
 """Entries of the configuration that change how the work is done and not what comes of it."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Summary:
-    """What is told of the learners that have been trained."""
-
-    results: pd.DataFrame
-    """A row for each learner, as :func:`hyuav.experiments.comparison.shards.tables` gives them."""
-    curves: pd.DataFrame
-    """A row for each of its evaluations in training."""
-    cells: pd.DataFrame
-    algorithms: pd.DataFrame
-    layouts: pd.DataFrame
-    """As ``algorithms``, on the random layouts alone; empty where there are none."""
-    improvements: pd.DataFrame
-
-    @property
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """What is logged, by name."""
-        names = ("algorithms", "cells", "results", "layouts", "improvements")
-        return {name: getattr(self, name) for name in names}
-
-    def save(self, directory: Path) -> None:
-        """Write ``results``, ``curves`` and ``cells`` as Parquet, the rest as ``summary.json``.
-
-        Raises:
-            OSError: one of them cannot be written; then an earlier one is still there.
-        """
-        for name in ("results", "curves", "cells"):
-            write_durably(directory / f"{name}.parquet", getattr(self, name).to_parquet())
-        content = {
-            name: getattr(self, name).to_dict(orient="records")
-            for name in ("algorithms", "layouts", "improvements")
-        }
-        text = json.dumps(content, indent=2)
-        write_durably(directory / "summary.json", f"{text}\n".encode())
 
 
 class ComparisonDirectory:
@@ -177,16 +134,7 @@ class ComparisonDirectory:
         if not finished:
             return None
         results, curves = map(_joined, zip(*finished, strict=True))
-        threshold = self.options.threshold
-        on_layouts = results[in_cells(results)["scenario"] == LAYOUTS]
-        return Summary(
-            results,
-            curves,
-            summarize_cells(results, threshold),
-            summarize_algorithms(results, threshold),
-            summarize_algorithms(on_layouts, threshold),
-            improvements(results),
-        )
+        return Summary.of(results, curves, self.options.threshold)
 
 
 def _joined(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:

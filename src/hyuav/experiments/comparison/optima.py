@@ -7,10 +7,10 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from hyuav._support.durable import write_durably
 from hyuav._support.errors import InputError
-from hyuav._support.files import read_parquet
-from hyuav.experiments.evaluation import OPTIMA, Policy
+from hyuav._support.files import read_parquet, write_durably
+from hyuav.experiments.evaluation import Policy
+from hyuav.experiments.schemes import OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import FlightPolicy, solve_horizons
 

@@ -18,7 +18,7 @@ from hyuav._support.parameters import (
     text,
     thread_count,
 )
-from hyuav.experiments.cluster import LOCAL, require_ray
+from hyuav.experiments.comparison.ray import LOCAL
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.cohort import Learner
@@ -180,5 +180,4 @@ def require_libraries(options: Compare) -> None:
         InputError: naming those that cannot, and how to get them.
     """
     require_installed([name for name in options.algorithm if name == PEER], "bench")
-    if options.engine == "ray":
-        require_ray()
+    require_installed([name for name in [options.engine] if name == "ray"], "cluster")

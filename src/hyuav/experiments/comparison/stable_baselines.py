@@ -14,8 +14,8 @@ from torch import Tensor, nn
 from hyuav.experiments.comparison.peer import ddpg_model
 from hyuav.experiments.comparison.plan import training_episodes
 from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
-from hyuav.experiments.experiment import LEARNED
 from hyuav.experiments.run_directory import RunConfiguration
+from hyuav.experiments.schemes import LEARNED
 from hyuav.learning.cohort import Learner
 from hyuav.physics.scenario import Scenario
 
@@ -55,8 +55,8 @@ def train(
         evaluation: of each learner's best weights.
 
     Returns:
-        a row for each evaluation and learner, as :func:`.shards.tables` takes them, and what each
-        learner's best weights earn in bps/Hz.
+        a row for each evaluation and learner, as :meth:`.shards.Shard.tables` takes them, and what
+        each learner's best weights earn in bps/Hz.
     """
     rows, sum_rates = [], []
     for index, learner in enumerate(configuration.learners):

@@ -48,7 +48,7 @@ def summarize_cells(results: pd.DataFrame, threshold: float) -> pd.DataFrame:
     """What is told of each cell.
 
     Args:
-        results: a row for each learner, as :func:`.shards.tables` gives them.
+        results: a row for each learner, as :meth:`.shards.Shard.tables` gives them.
         threshold: share of the optimum that counts as solved.
 
     Returns:
@@ -59,23 +59,12 @@ def summarize_cells(results: pd.DataFrame, threshold: float) -> pd.DataFrame:
     """
     rows = []
     for identity, cell in in_cells(results).groupby(["algorithm", *_CELL], sort=False):
-        fraction = cell["fraction"].to_numpy()
-        low, high = stratified_interval([fraction], interquartile_mean)
-        rows.append(
-            {
-                **dict(zip(["algorithm", *_CELL], identity, strict=True)),
-                "learners": len(cell),
-                "iqm": float(interquartile_mean([fraction])),
-                "low": float(low),
-                "high": float(high),
-                "worst": fraction.min(),
-                "above_threshold": (fraction >= threshold).mean(),
-                **{
-                    f"median_{column}": np.median(cell[column].fillna(np.inf))
-                    for column in ("episodes_to_threshold", "seconds_to_threshold")
-                },
-            }
-        )
+        names = dict(zip(["algorithm", *_CELL], identity, strict=True))
+        medians = {
+            f"median_{column}": np.median(cell[column].fillna(np.inf))
+            for column in ("episodes_to_threshold", "seconds_to_threshold")
+        }
+        rows.append(names | _described([cell["fraction"].to_numpy()], threshold) | medians)
     return pd.DataFrame(rows)
 
 
@@ -84,30 +73,34 @@ def summarize_algorithms(results: pd.DataFrame, threshold: float) -> pd.DataFram
 
     Returns:
         by ``algorithm``: the number of ``learners``; the fraction's ``iqm`` with its stratified
-        interval ``low`` to ``high``, ``median`` and ``worst``; ``near_optimal`` and
-        ``above_threshold``, the shares of learners that reach :data:`NEAR_OPTIMAL` and the
-        threshold; and ``seconds``, the median that a learner took.
+        interval ``low`` to ``high``, ``worst`` and ``median``; ``above_threshold`` and
+        ``near_optimal``, the shares of learners that reach the threshold and
+        :data:`NEAR_OPTIMAL`; and ``seconds``, the median that a learner took.
     """
-    rows = []
-    for algorithm, own in in_cells(results).groupby("algorithm", sort=False):
-        cells = list(_samples(own).values())
-        low, high = stratified_interval(cells, interquartile_mean)
-        fraction = own["fraction"]
-        rows.append(
-            {
-                "algorithm": algorithm,
-                "learners": len(own),
-                "iqm": float(interquartile_mean(cells)),
-                "low": float(low),
-                "high": float(high),
-                "median": fraction.median(),
-                "worst": fraction.min(),
-                "near_optimal": (fraction >= NEAR_OPTIMAL).mean(),
-                "above_threshold": (fraction >= threshold).mean(),
-                "seconds": own["seconds"].median(),
-            }
-        )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        {
+            "algorithm": algorithm,
+            **_described(list(_samples(own).values()), threshold),
+            "median": own["fraction"].median(),
+            "near_optimal": (own["fraction"] >= NEAR_OPTIMAL).mean(),
+            "seconds": own["seconds"].median(),
+        }
+        for algorithm, own in in_cells(results).groupby("algorithm", sort=False)
+    )
+
+
+def _described(cells: Sequence[Array], threshold: float) -> dict[str, Any]:
+    """What is told of the fractions in one or several cells."""
+    fractions = np.concatenate(cells)
+    low, high = stratified_interval(cells, interquartile_mean)
+    return {
+        "learners": len(fractions),
+        "iqm": float(interquartile_mean(cells)),
+        "low": float(low),
+        "high": float(high),
+        "worst": fractions.min(),
+        "above_threshold": (fractions >= threshold).mean(),
+    }
 
 
 def performance_profiles(results: pd.DataFrame, fractions: ArrayLike) -> pd.DataFrame:
@@ -171,7 +164,7 @@ def learning_curves(curves: pd.DataFrame) -> pd.DataFrame:
     A learner that stopped stays at its best; without an evaluation before that, it has no part.
 
     Args:
-        curves: a row for each learner and evaluation, as :func:`.shards.tables`
+        curves: a row for each learner and evaluation, as :meth:`.shards.Shard.tables`
             gives them.
 
     Returns:

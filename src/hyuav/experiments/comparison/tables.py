@@ -10,8 +10,8 @@ from rich.table import Table
 
 from hyuav._support.errors import harmless
 from hyuav._support.terminal import print_line, print_table, results_table
-from hyuav.experiments.comparison.directory import Summary
 from hyuav.experiments.comparison.statistics import NEAR_OPTIMAL
+from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.metrics import finite_numbers
 from hyuav.learning.registry import PEER
 
@@ -37,7 +37,7 @@ def stopped(results: pd.DataFrame) -> list[str]:
     """A line for each learner that stopped for want of finite numbers.
 
     Args:
-        results: a row for each learner, as :func:`.shards.tables` gives them; those
+        results: a row for each learner, as :meth:`.shards.Shard.tables` gives them; those
             of older comparisons do not tell who stopped.
     """
     if "stopped" not in results:

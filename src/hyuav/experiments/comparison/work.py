@@ -9,7 +9,7 @@ from hyuav._support.terminal import make_progress
 from hyuav.experiments.comparison.directory import ComparisonDirectory
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.processes import Workers
-from hyuav.experiments.comparison.ray import RayWorkers
+from hyuav.experiments.comparison.ray import ray_workers
 from hyuav.experiments.comparison.shards import Shard
 
 
@@ -27,7 +27,7 @@ def work_off(comparison: ComparisonDirectory, console: Console) -> dict[str, str
     """
     failures: dict[str, str] = {}
     options = comparison.options
-    begin = Workers if options.engine == "processes" else partial(RayWorkers, options.address)
+    begin = Workers if options.engine == "processes" else partial(ray_workers, options.address)
     unsolved = [own for own in comparison.optima.values() if not own.is_solved]
     pending = [shard for shard in comparison.shards if not shard.is_finished]
     for file in (*(own.file for own in unsolved), *(shard.path for shard in pending)):

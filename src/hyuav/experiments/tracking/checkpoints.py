@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from hyuav._support.errors import InputError, harmless, rejection
 from hyuav._support.parameters import count, number, optional
-from hyuav.experiments.metrics_file import MetricsPosition, undamaged_metrics
+from hyuav.experiments.metrics import MetricsPosition, remove_damaged_rows
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.tracking.parameters import identifier
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
@@ -90,7 +90,7 @@ def restore(run: RunDirectory, begin: Callable[[], Training]) -> tuple[Training,
         if training is not None:
             reasons.append(f"{run.metrics_file}: its damaged rows are lost")
             _take(found, run, training, reasons)
-            metrics = undamaged_metrics(run.metrics_file, training.episode)
+            metrics = remove_damaged_rows(run.metrics_file, training.episode)
             return training, dataclasses.replace(found.reported, metrics=metrics)
     raise InputError(reasons[0])
 

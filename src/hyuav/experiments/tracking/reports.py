@@ -10,8 +10,9 @@ import pandas as pd
 import wandb
 from rich.console import Console
 
-from hyuav.experiments.evaluation import LABELS, Evaluation
+from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import REPORT_FILE, RunDirectory
+from hyuav.experiments.schemes import LABELS
 from hyuav.experiments.tracking.parameters import AS_TRAINED, LONGEST, LoggerParameters
 from hyuav.experiments.tracking.session import Session, model_name, remembered
 

@@ -17,9 +17,8 @@ from typing import Any, Self
 import wandb
 from rich.console import Console
 
-from hyuav._support.durable import write_durably
 from hyuav._support.errors import harmless
-from hyuav._support.files import read_regular
+from hyuav._support.files import read_regular, write_durably
 from hyuav._support.terminal import print_line
 from hyuav.experiments.tracking.parameters import LoggerParameters, identifier
 
@@ -86,7 +85,7 @@ class Session:
             return
         self._run = None
         if run.offline:
-            path = _relative(self._directory / "wandb")
+            path = os.path.relpath(self._directory / "wandb")
             hint = f"W&B, offline: wandb sync {path} (in the terminal: wandb leet {path})"
         else:
             hint = f"W&B: {run.url}"
@@ -109,7 +108,7 @@ class Session:
             action(self._run)
         except Exception as error:  # of whatever kind: it must not stop hours of training
             self._run = None
-            kept = _relative(self._directory / "wandb")
+            kept = os.path.relpath(self._directory / "wandb")
             _say(f"nothing more is logged ({_reason(error)}); so far: wandb sync {kept}")
             with contextlib.suppress(Exception):
                 wandb.teardown(exit_code=1)
@@ -137,7 +136,7 @@ class Session:
                     kept = _place(run, f"{alias}-{run.step}{file.suffix}")
                     _link(file, kept)
                     artifact = wandb.Artifact(model_name(run.id), "model", metadata=dict(metadata))
-                    artifact.add_file(_relative(kept), file.name, policy="immutable")
+                    artifact.add_file(os.path.relpath(kept), file.name, policy="immutable")
                     run.log_artifact(artifact, aliases=[alias, "latest"])
 
         self.attempt(log)
@@ -265,7 +264,7 @@ def _keep_artifacts(run: wandb.Run) -> None:
             if entry.local_path is not None and Path(entry.local_path).is_absolute():
                 kept = _place(run, f"{artifact.name}-{run.step}")
                 shutil.move(entry.local_path, kept)
-                entry.local_path = _relative(kept)
+                entry.local_path = os.path.relpath(kept)
         return log_artifact(artifact, *arguments, **options)
 
     run.log_artifact = log  # type: ignore[assignment]
@@ -285,10 +284,6 @@ def _link(file: Path, target: Path) -> None:
         target.hardlink_to(file)
     except OSError:
         shutil.copyfile(file, target)
-
-
-def _relative(path: Path) -> str:
-    return os.path.relpath(path)
 
 
 def _reason(error: Exception) -> str:

@@ -13,8 +13,8 @@ import wandb
 from rich.console import Console
 
 from hyuav._support.terminal import TrainingProgress
-from hyuav.experiments.metrics_file import MetricsFile
-from hyuav.experiments.run_directory import METRIC_COLUMNS, RunConfiguration, RunDirectory
+from hyuav.experiments.metrics import METRIC_COLUMNS, MetricsFile
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import Reported, save_checkpoints
 from hyuav.experiments.tracking.parameters import LoggerParameters
 from hyuav.experiments.tracking.session import Session

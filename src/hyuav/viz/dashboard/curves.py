@@ -10,9 +10,8 @@ import pandas as pd
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from hyuav.experiments.evaluation import LABELS, OPTIMA
-from hyuav.experiments.experiment import LEARNED
 from hyuav.experiments.intervals import interquartile_curve
+from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.viz.html.style import axis, base_layout, plain, scheme_color, scheme_dash
 
 Values = NDArray[np.float64]

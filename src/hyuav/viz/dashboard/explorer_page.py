@@ -7,9 +7,9 @@ import plotly.graph_objects as go
 import streamlit as st
 
 from hyuav._support.errors import InputError
-from hyuav.experiments.evaluation import OPTIMA, Evaluation
-from hyuav.experiments.experiment import LEARNED
+from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import named_scenario
+from hyuav.experiments.schemes import LEARNED, OPTIMA
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.physics.slot import SCHEMES
 from hyuav.viz.dashboard import draft as drafts

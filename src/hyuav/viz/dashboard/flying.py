@@ -7,9 +7,10 @@ from functools import lru_cache
 from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection
-from hyuav.experiments.evaluation import OPTIMA, Evaluation, EvaluationParameters, Policy, evaluate
-from hyuav.experiments.experiment import LEARNED, learned_policy
+from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.experiments.policies import learned_policy
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.schemes import LEARNED, OPTIMA
 from hyuav.learning.cohort import Learner
 from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario

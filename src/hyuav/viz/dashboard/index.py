@@ -15,10 +15,10 @@ import yaml
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import YAML_LOADER, require_plain_yaml
-from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, OPTIMA
-from hyuav.experiments.metrics import parse_rows
+from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
+from hyuav.experiments.metrics import GrowingMetrics, last_metrics
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.viz.dashboard.growing import GrowingMetrics, require_columns
+from hyuav.experiments.schemes import OPTIMA
 
 RUNNING_SECONDS = 120.0
 """A training that wrote nothing for longer counts as stopped."""
@@ -267,7 +267,9 @@ def _summarize(
     schemes = [own.get("scheme") for own in learners if isinstance(own, dict)]
     training = config.get("training")
     training = training if isinstance(training, dict) else {}
-    rows = _last_rows(metrics_file, len(learners), training.get("evaluation_every"))
+    every = training.get("evaluation_every")
+    every = min(max(every, 1), 1000) if isinstance(every, int) else 10
+    rows = last_metrics(metrics_file, _ROW_BYTES * max(len(learners), 1) * (every + 2))
     best = rows.get("best_evaluation", pd.Series(dtype=float)).max()
     planned = training.get("num_episodes")
     return RunEntry(
@@ -287,23 +289,3 @@ def _name(values: object) -> str:
     """What a section of the configuration calls itself, cut to what a table has room for."""
     name = values.get("name") if isinstance(values, dict) else None
     return str(name)[:80] if isinstance(name, str) else "unknown"
-
-
-def _last_rows(path: Path, learners: int, evaluation_every: object) -> pd.DataFrame:
-    """The rows since the last evaluation at least, without reading all of the file."""
-    every = evaluation_every if isinstance(evaluation_every, int) else 10
-    wanted = _ROW_BYTES * max(learners, 1) * (min(max(every, 1), 1000) + 2)
-    with path.open("rb") as file:
-        header = file.readline(_LARGEST_CONFIG)
-        begin = max(file.seek(0, os.SEEK_END) - wanted, len(header))
-        file.seek(begin)
-        lines = file.read()
-    if begin > len(header):
-        lines = lines[lines.find(b"\n") + 1 :]
-    lines = lines[: lines.rfind(b"\n") + 1]
-    if not lines:
-        return pd.DataFrame()
-    try:
-        return parse_rows(lines, require_columns(path, header))
-    except InputError:
-        return pd.DataFrame()

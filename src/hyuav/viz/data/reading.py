@@ -12,7 +12,8 @@ import pandas as pd
 from hyuav._support.errors import InputError
 from hyuav._support.files import read_parquet
 from hyuav._support.parameters import read_yaml
-from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, LABELS
+from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
+from hyuav.experiments.schemes import LABELS
 
 _PER_UE = {"offloading", "secrecy_rate", "ue_energy"}
 _FLIGHT_COLUMNS = {

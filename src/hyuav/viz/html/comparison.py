@@ -12,9 +12,10 @@ from hyuav.experiments.comparison.plan import LAYOUT, Compare
 from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.experiments.comparison.statistics import summarize_algorithms, summarize_cells
 from hyuav.experiments.comparison.tables import label, stopped
-from hyuav.experiments.evaluation import LABELS, EvaluationParameters, evaluate
-from hyuav.experiments.experiment import learned_policies
+from hyuav.experiments.evaluation import EvaluationParameters, evaluate
+from hyuav.experiments.policies import learned_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.reading import readable_config, readable_table
 from hyuav.viz.html.curves import comparison_figures

@@ -10,9 +10,8 @@ import plotly.graph_objects as go
 
 from hyuav.experiments.comparison.statistics import learning_curves, performance_profiles
 from hyuav.experiments.comparison.tables import label
-from hyuav.experiments.evaluation import LABELS
-from hyuav.experiments.experiment import LEARNED
 from hyuav.experiments.intervals import interquartile_band, interquartile_curve
+from hyuav.experiments.schemes import LABELS, LEARNED
 from hyuav.viz.html.style import (
     DASHES,
     GRID_COLOR,
@@ -64,7 +63,7 @@ def learning_figure(
 
     Args:
         metrics: rows of ``metrics.csv``, whose ``scheme`` is a mode rule as it stands there, or
-            a name of :data:`hyuav.experiments.evaluation.LABELS`. May be empty.
+            a name of :data:`hyuav.experiments.schemes.SCHEMES`. May be empty.
         optima: what the best flight of the scheme earns in bps/Hz, by the same names.
         quantity: a column of :data:`QUANTITIES`.
     """
@@ -185,7 +184,7 @@ def comparison_figures(
     """The figures of a comparison, by their titles.
 
     Args:
-        results: a row per learner, as :class:`.comparison.directory.Summary` holds them.
+        results: a row per learner, as :class:`.comparison.summary.Summary` holds them.
         curves: a row per evaluation in training, likewise.
         cells: a row per algorithm, scenario, scheme and horizon, likewise.
         threshold: share of the optimum that counts as solved, drawn as a line.

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from hyuav._support.durable import write_durably
+from hyuav._support.files import write_durably
 
 
 class Picture(NamedTuple):

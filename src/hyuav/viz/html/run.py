@@ -8,16 +8,11 @@ from typing import Any
 import pandas as pd
 
 from hyuav._support.errors import InputError
-from hyuav.experiments.evaluation import (
-    LABELS,
-    MODE_RULES,
-    OPTIMA,
-    EvaluationParameters,
-    Policy,
-    evaluate,
-)
-from hyuav.experiments.experiment import LEARNED, LEARNED_AS_IN_PAPER, LINEAR, learned_policies
-from hyuav.experiments.run_directory import RunDirectory, named_scenario, readable_metrics
+from hyuav.experiments.evaluation import EvaluationParameters, evaluate
+from hyuav.experiments.metrics import readable_metrics
+from hyuav.experiments.policies import learned_policies, straight_policies
+from hyuav.experiments.run_directory import RunDirectory, named_scenario
+from hyuav.experiments.schemes import LABELS, LEARNED, LEARNED_AS_IN_PAPER, SCHEMES
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.reading import readable_config, readable_evaluation, readable_flights
 from hyuav.viz.html.curves import MAX_POINTS, QUANTITIES, learning_figure
@@ -168,11 +163,7 @@ def _fly(run: RunDirectory, name: str) -> _Flown:
     if scenario.num_slots not in horizons:
         scenario = dataclasses.replace(scenario, num_slots=max(horizons))
     policies = learned_policies([run], scenario)
-    for scheme, straight in LINEAR.items():
-        try:
-            policies[scheme] = [Policy(straight(scenario))]
-        except InputError:  # too fast for the horizon
-            continue
+    policies |= straight_policies(scenario)[0]
     evaluation = evaluate(scenario, name, policies, QUICK)
     note = (
         f"Nothing was evaluated yet: for this report, the best weights so far and the straight "
@@ -237,9 +228,9 @@ def _curves(
 def _optima(schemes: Mapping[str, Any]) -> dict[str, float]:
     """What the best flight of each scheme earns in bps/Hz, where it was evaluated."""
     return {
-        scheme: schemes[optimum]["secrecy_sum_rate"]["mean"]
-        for scheme, rule in MODE_RULES.items()
-        if (optimum := OPTIMA[rule]) in schemes
+        name: schemes[scheme.optimum]["secrecy_sum_rate"]["mean"]
+        for name, scheme in SCHEMES.items()
+        if scheme.optimum in schemes
     }
 
 

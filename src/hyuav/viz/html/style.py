@@ -3,7 +3,7 @@
 import html
 from typing import Any
 
-from hyuav.experiments.evaluation import LABELS, MODE_RULES, OPTIMA
+from hyuav.experiments.schemes import LABELS, SCHEMES, Kind
 from hyuav.viz.paper import COLORS
 
 OPTIMUM_COLOR = "#6B6B6B"
@@ -28,9 +28,10 @@ def scheme_label(scheme: str) -> str:
 
 def scheme_dash(scheme: str) -> str:
     """The scheme's line in every figure."""
-    if scheme in OPTIMA.values():
+    known = SCHEMES.get(scheme)
+    if known is not None and known.kind is Kind.OPTIMUM:
         return DASHES["optimum"]
-    return DASHES["jamming" if MODE_RULES.get(scheme) == "jamming" else "relay"]
+    return DASHES["jamming" if known is not None and known.mode_rule == "jamming" else "relay"]
 
 
 def plain(text: object) -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 from markupsafe import Markup, escape
 
 from hyuav.experiments.comparison.tables import label
-from hyuav.experiments.evaluation import LABELS
+from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.html.style import scheme_color
 

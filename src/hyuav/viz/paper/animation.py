@@ -15,14 +15,14 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from hyuav._support.durable import write_durably
+from hyuav._support.files import write_durably
 from hyuav.envs.rendering import (
     UE_COLOR,
     draw_coverage,
     draw_flight,
     draw_scenario,
 )
-from hyuav.experiments.evaluation import LABELS
+from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import Point, Scenario
 from hyuav.viz.paper.flights import path_of
 from hyuav.viz.paper.maps import MODE_COLORS

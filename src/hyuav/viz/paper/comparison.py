@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from hyuav.envs.rendering import OKABE_ITO
-from hyuav.experiments.comparison.directory import Summary
 from hyuav.experiments.comparison.plan import ENTRIES, PIECES, Compare
 from hyuav.experiments.comparison.statistics import learning_curves, performance_profiles
+from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.comparison.tables import MOST_COLUMNS, label
 from hyuav.learning.registry import PEER
 from hyuav.viz.paper import COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure

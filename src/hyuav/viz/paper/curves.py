@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from hyuav.experiments.evaluation import LABELS
 from hyuav.experiments.intervals import interquartile_mean, stratified_interval
+from hyuav.experiments.schemes import LABELS
 from hyuav.viz.paper.style import COLORS, COLUMN_WIDTH, DOTTED, LINES, STYLE
 
 SMOOTHING = 25

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR, draw_flight, draw_scenario, mode_handles
-from hyuav.experiments.evaluation import LABELS
+from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.paper.style import COLORS, COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
 

@@ -12,9 +12,10 @@ from rich.console import Console
 from hyuav._support.errors import InputError
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.comparison.tables import label
-from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, LABELS, OPTIMA
-from hyuav.experiments.experiment import LEARNED
-from hyuav.experiments.run_directory import RunDirectory, readable_metrics
+from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
+from hyuav.experiments.metrics import readable_metrics
+from hyuav.experiments.run_directory import RunDirectory
+from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.reading import is_drawable, readable_evaluation, readable_flights
 from hyuav.viz.paper.animation import animate_flight

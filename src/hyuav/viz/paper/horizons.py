@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hyuav.experiments.evaluation import LABELS, OPTIMA
+from hyuav.experiments.schemes import LABELS, OPTIMA
 from hyuav.viz.paper.style import COLORS, COLUMN_WIDTH, COMPARED, DOTTED, LINES, STYLE
 
 MARKERS = {"proposed": "o", "ja_ot": "s", "re_ot": "^", "re_lt": "v", "ja_lt": "D"}

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
-from hyuav.experiments.evaluation import LABELS
+from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.paper.flights import first_flight
 from hyuav.viz.paper.maps import MODE_COLORS

@@ -9,7 +9,7 @@ import matplotlib as mpl
 import pandas as pd
 from matplotlib.figure import Figure
 
-from hyuav._support.durable import write_durably
+from hyuav._support.files import write_durably
 from hyuav.envs.rendering import OKABE_ITO
 
 COLUMN_WIDTH, PAGE_WIDTH = 3.5, 7.16

@@ -8,7 +8,7 @@ import psutil
 import pytest
 
 from hyuav._support.errors import InputError, brief
-from hyuav.experiments.cluster import LOCAL, connected, outcomes
+from hyuav.experiments.comparison.ray import LOCAL, ray_workers
 
 Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
@@ -33,7 +33,7 @@ def unanswered() -> str:
 def refused(address: str) -> str:
     """The line that answers an address, given before Ray is loaded and waits."""
     pytest.importorskip("ray")
-    with pytest.raises(InputError) as caught, connected(address, 1, prints=False):
+    with pytest.raises(InputError) as caught, ray_workers(address, 1, 0):
         pass
     line, _, reason = str(caught.value).partition("of a Ray that runs")
     assert line == f"address = {brief(address)}: expected local, auto or HOST:PORT "
@@ -56,8 +56,8 @@ def test_what_is_no_address_is_refused(address: str) -> None:
 @pytest.mark.slow
 def test_it_listens_on_the_loopback_alone() -> None:
     pytest.importorskip("ray")
-    with connected(LOCAL, 2, prints=False):
-        assert sorted(piece for piece, _ in outcomes(str, [1, 2], retries=0)) == [1, 2]
+    with ray_workers(LOCAL, 2, 0) as workers:
+        assert sorted(workers.attempt_all(print, [1, 2])) == [(1, None), (2, None)]
         found = set(listening(psutil.Process()))
     assert {"raylet", "gcs_server"} <= {name for name, _ in found}
     assert [own for own in found if not own[1].is_loopback] == []

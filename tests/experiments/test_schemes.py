@@ -1,0 +1,16 @@
+from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, OPTIMA, SCHEMES
+from hyuav.physics import slot
+
+
+def test_every_mode_rule_is_learned_twice_and_has_an_optimum() -> None:
+    for schemes in (LEARNED, LEARNED_AS_IN_PAPER, OPTIMA):
+        assert set(schemes) == set(slot.SCHEMES)
+        assert all(SCHEMES[name].mode_rule == rule for rule, name in schemes.items())
+
+
+def test_a_scheme_is_measured_against_the_optimum_of_its_mode_rule() -> None:
+    assert {name: scheme.optimum for name, scheme in SCHEMES.items()} == {
+        **dict.fromkeys(("proposed", "proposed_paper", "optimum"), "optimum"),
+        **dict.fromkeys(("ja_ot", "ja_ot_paper", "ja_lt", "ja_optimum"), "ja_optimum"),
+        **dict.fromkeys(("re_ot", "re_ot_paper", "re_lt", "re_optimum"), "re_optimum"),
+    }
