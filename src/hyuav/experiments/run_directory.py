@@ -289,6 +289,24 @@ class RunDirectory:
         return metrics
 
 
+def load(path: str | Path) -> RunDirectory:
+    """A run that was kept: its configuration, its metrics and its best weights.
+
+    Args:
+        path: of the run's directory.
+
+    Raises:
+        InputError: there is no run here, or its ``config.yaml`` is not one.
+
+    Example:
+        >>> run = load("runs/NAME")
+        >>> run.metrics().groupby("learner")["best_evaluation"].last()
+    """
+    run = RunDirectory(path)
+    run.configuration()
+    return run
+
+
 def readable_metrics(path: str | Path) -> pd.DataFrame:
     """What can be read of a ``metrics.csv``, also while it is being written.
 
