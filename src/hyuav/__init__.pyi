@@ -32,4 +32,6 @@ from hyuav.references.optimum import FlightPolicy as FlightPolicy
 from hyuav.references.straight import ja_lt as ja_lt
 from hyuav.references.straight import re_lt as re_lt
 
+__all__: list[str]
 __version__: str
+_ORIGINS: dict[str, tuple[str, str]]
