@@ -16,7 +16,10 @@ ROOMS = {
 }
 """Pages and their titles."""
 
-SHARED = {"physics": ("hyuav._support.errors", "hyuav._support.parameters")}
+SHARED = {
+    "physics": ("hyuav._support.errors", "hyuav._support.parameters"),
+    "experiments": ("hyuav.cli",),
+}
 """Modules that stand beside the packages, by the page that shows them."""
 
 
