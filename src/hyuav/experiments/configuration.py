@@ -124,7 +124,8 @@ def recipe(
             register(groups)
             if not {"-h", "--help"}.isdisjoint(sys.argv[1:]):
                 offered = {group: (member, _members(group)) for group, member in groups.items()}
-                print(usage(name, function.__globals__["__doc__"], node, offered, sections))
+                told = usage(name, function.__globals__["__doc__"], node, offered, sections)
+                sys.stdout.write(f"{told}\n")  # at once, as what is piped to may end early
                 return
             with _ending_in_one_line(lambda: composed):
                 loaded()  # from here on an interruption is answered
