@@ -1,12 +1,14 @@
-"""Measure how fast this project is beside its peers, in one run and on this machine.
+"""Measure how fast this project is beside its peers, on this machine.
 
 pip install 'hyuav[bench]'
-python -m benchmarks
-python -m benchmarks parts=training learners=[1,10,30] seconds=20
-python -m benchmarks quick=true
+hyuav benchmark
+hyuav benchmark parts=training learners=[1,10,30] seconds=20
+hyuav benchmark quick=true
 """
 
-import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
 
 from pathlib import Path
 

@@ -1,13 +1,15 @@
-"""Compare algorithms on the same scenarios, schemes, horizons and seeds, beside the optimum.
+"""Compare algorithms on equal terms, each learner beside the optimum.
 
-python recipes/compare.py
-python recipes/compare.py algorithm=[ddpg,td3] scenario=two_clusters learners=5
-python recipes/compare.py scenario=[] layouts=50 learners=1
-python recipes/compare.py output=runs/NAME
-python recipes/compare.py learners=1000 engine=ray address=auto
+hyuav compare
+hyuav compare algorithm=[ddpg,td3] scenario=two_clusters learners=5
+hyuav compare scenario=[] layouts=50 learners=1
+hyuav compare output=runs/NAME
+hyuav compare learners=1000 engine=ray address=auto
 """
 
-import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
 
 import sys
 from functools import partial

@@ -1,11 +1,13 @@
-"""Follow trainings, compare runs, play flights and try scenarios, in a browser.
+"""Look at runs in a browser: learning curves, flights, scenarios.
 
 pip install 'hyuav[dashboard]'
-python recipes/dashboard.py
-python recipes/dashboard.py runs=runs port=8600
+hyuav dashboard
+hyuav dashboard runs=runs port=8600
 """
 
-import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
 
 from pathlib import Path
 

@@ -1,10 +1,12 @@
 """Draw the figures of a finished run again, from its files alone.
 
-python recipes/draw.py run=runs/NAME
-python recipes/draw.py run=runs/NAME figures=[trajectories,animation]
+hyuav draw run=runs/NAME
+hyuav draw run=runs/NAME figures=[trajectories,animation]
 """
 
-import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
 
 from dataclasses import dataclass
 from pathlib import Path

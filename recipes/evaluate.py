@@ -1,11 +1,13 @@
-"""Evaluate saved runs against the reference schemes and the optimum, offline.
+"""Fly saved runs beside the reference schemes and the optimum.
 
-python recipes/evaluate.py run=runs/NAME
-python recipes/evaluate.py run=[runs/HYBRID,runs/RELAY,runs/JAMMING]
-python recipes/evaluate.py run=runs/NAME num_slots=10
+hyuav evaluate run=runs/NAME
+hyuav evaluate run=[runs/HYBRID,runs/RELAY,runs/JAMMING]
+hyuav evaluate run=runs/NAME num_slots=10
 """
 
-import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
 
 import dataclasses
 import os

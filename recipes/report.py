@@ -1,10 +1,12 @@
-"""Write or rewrite the report of a run or of a comparison: one HTML file that opens by itself.
+"""Write the report of a run or of a comparison: one HTML file.
 
-python recipes/report.py run=runs/NAME
-python recipes/report.py run=[runs/ONE,runs/OTHER]
+hyuav report run=runs/NAME
+hyuav report run=[runs/ONE,runs/OTHER]
 """
 
-import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,15 +1,18 @@
-"""The main job: train Proposed, Re-OT and Ja-OT, set them beside the references, draw.
+"""Do the main job: train the learned schemes, evaluate, draw.
 
-They are trained twice: by the robust variant of DDPG, and exactly as in the paper.
+The schemes are Proposed, Re-OT and Ja-OT, each trained twice: by the robust variant of DDPG, and
+exactly as in the paper. Straight flights and the best possible ones are set beside them.
 
-python recipes/reproduce.py
-python recipes/reproduce.py scenario=random_disk training.num_episodes=600
-python recipes/reproduce.py seeds=10 further_seeds=5 num_slots=[10,12,14,16,18,20] also=random_disk
-python recipes/reproduce.py figures=[learning_curves,trajectories]
-python recipes/reproduce.py hydra.run.dir=runs/NAME
+hyuav reproduce
+hyuav reproduce scenario=random_disk training.num_episodes=600
+hyuav reproduce seeds=10 num_slots=[10,15,20] also=random_disk
+hyuav reproduce figures=[learning_curves,trajectories]
+hyuav reproduce hydra.run.dir=runs/NAME
 """
 
-import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence

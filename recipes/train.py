@@ -1,11 +1,13 @@
 """Train learners and keep the run.
 
-python recipes/train.py scenario=two_clusters scheme=hybrid algorithm=ddpg seed=0
-python recipes/train.py scheme=[hybrid,relay,jamming] num_slots=[10,20] learners=10
-python recipes/train.py resume=runs/NAME
+hyuav train scenario=two_clusters scheme=hybrid algorithm=ddpg seed=0
+hyuav train scheme=[hybrid,relay,jamming] num_slots=[10,20] learners=10
+hyuav train resume=runs/NAME
 """
 
-import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
 
 from dataclasses import dataclass
 from pathlib import Path

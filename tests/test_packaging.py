@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+import hyuav
+
 ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 BESIDE_THE_CODE = (
@@ -23,6 +25,7 @@ BESIDE_THE_CODE = (
     "MANIFEST.in",
     "README.md",
     "pyproject.toml",
+    "setup.py",
 )
 EXAMPLE = ROOT / "examples" / "first_training.py"
 
@@ -34,7 +37,7 @@ def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in BESIDE_THE_CODE:
         shutil.copy(ROOT / name, source)
     leave = shutil.ignore_patterns("__pycache__", "*.egg-info")
-    for name in ("src", "tests", "recipes"):
+    for name in ("src", "tests", "recipes", "benchmarks"):
         shutil.copytree(ROOT / name, source / name, ignore=leave)
     command = [sys.executable, "-m", "build", "--no-isolation", f"--outdir={source}/dist"]
     built = subprocess.run([*command, source], capture_output=True, text=True, check=False)
@@ -68,20 +71,21 @@ def run(installed: Path, directory: Path, *arguments: str) -> str:
 
 
 @pytest.mark.slow
-def test_the_wheel_holds_the_library_and_nothing_else(dist: Path) -> None:
+def test_the_wheel_holds_the_library_the_recipes_and_nothing_else(dist: Path) -> None:
     (wheel,) = dist.glob("*.whl")
-    names = zipfile.ZipFile(wheel).namelist()
-    own = {str(path.relative_to(ROOT / "src")) for path in (ROOT / "src").rglob("*.py")}
-    assert own <= set(names)
-    data = {"hyuav/py.typed"}
-    data |= {
-        str(path.relative_to(ROOT / "src"))
-        for path in (ROOT / "src/hyuav/report/templates").iterdir()
-    }
-    assert len(data) > 1
-    assert data <= set(names)
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        entry_points = archive.read(f"{wheel.name.split('-py3')[0]}.dist-info/entry_points.txt")
+    source = ROOT / "src"
+    library = {str(path.relative_to(source)) for path in source.rglob("*.py*") if path.is_file()}
+    library = {name for name in library if "__pycache__" not in name}
+    templates = (source / "hyuav/viz/html/templates").iterdir()
+    data = {"hyuav/py.typed", *(str(path.relative_to(source)) for path in templates)}
+    recipes = {f"hyuav/recipes/{path.name}" for path in (ROOT / "recipes").glob("*.py")}
+    assert min(len(library), len(data), len(recipes)) > 1
     beside = {name for name in names if not name.startswith("hyuav-")}
-    assert beside == own | data
+    assert beside == library | data | recipes
+    assert entry_points.decode().split("\n")[:2] == ["[console_scripts]", "hyuav = hyuav.cli:main"]
 
 
 @pytest.mark.slow
@@ -89,8 +93,8 @@ def test_the_sdist_holds_what_the_wheel_is_built_from(dist: Path) -> None:
     (sdist,) = dist.glob("*.tar.gz")
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
-    assert {*BESIDE_THE_CODE, "src/hyuav/py.typed"} <= names
-    assert not any(name.startswith("tests") for name in names)
+    assert {*BESIDE_THE_CODE, "src/hyuav/py.typed", "recipes/train.py"} <= names
+    assert not any(name.startswith(("tests", "benchmarks")) for name in names)
 
 
 @pytest.mark.slow
@@ -104,6 +108,19 @@ def test_the_wheel_makes_environments_and_presets(installed: Path, tmp_path: Pat
     )
     shown = run(installed, tmp_path, "-c", program)
     assert shown.split(maxsplit=1) == [str(installed / "hyuav/__init__.py"), "(15,) 10\n"]
+
+
+@pytest.mark.slow
+def test_the_wheel_brings_the_command_and_its_recipes(installed: Path, tmp_path: Path) -> None:
+    command = [str(installed / "bin" / "hyuav")]
+    version = run(installed, tmp_path, *command, "--version")
+    assert version == f"hyuav {hyuav.__version__}\n"
+    assert "reproduce" in run(installed, tmp_path, *command, "--help")
+    assert "resume=runs/NAME" in run(installed, tmp_path, *command, "train", "--help")
+    run(installed, tmp_path, *command, "copy", "train")
+    copied = tmp_path / "train.py"
+    assert copied.read_bytes() == (ROOT / "recipes" / "train.py").read_bytes()
+    assert "resume=runs/NAME" in run(installed, tmp_path, copied.name, "--help")
 
 
 @pytest.mark.slow
@@ -122,7 +139,7 @@ def test_the_example_has_five_lines() -> None:
 
 
 def test_changelog_and_citation_are_of_this_version() -> None:
-    version = PROJECT["version"]
+    version = hyuav.__version__
     changelog = (ROOT / "CHANGELOG.md").read_text()
     latest = re.search(r"^## (\S+) - (unreleased|\d{4}-\d\d-\d\d)$", changelog, flags=re.MULTILINE)
     assert latest is not None

@@ -16,7 +16,10 @@ ROOMS = {
 }
 """Pages and their titles."""
 
-SHARED = {"physics": ("hyuav._support.errors", "hyuav._support.parameters")}
+SHARED = {
+    "physics": ("hyuav._support.errors", "hyuav._support.parameters"),
+    "experiments": ("hyuav.cli",),
+}
 """Modules that stand beside the packages, by the page that shows them."""
 
 
@@ -53,15 +56,12 @@ def _directive(name: str) -> str:
 
 
 def _index() -> str:
-    exported = {name: getattr(hyuav, name) for name in hyuav.__all__}
-    links = [
-        f"[`hyuav.{name}`][{value.__module__}.{value.__qualname__}]"
-        for name, value in exported.items()
-    ]
+    links = [f"[`hyuav.{name}`][{module}.{own}]" for name, (module, own) in hyuav._ORIGINS.items()]
     rooms = [f"- [{title}]({room}.md)" for room, title in ROOMS.items()]
     return (
         "# Python API\n\n"
-        f"What `import hyuav` gives: {', '.join(links)}. All of it, room by room:\n\n"
+        f"What `import hyuav` gives is public: {', '.join(links)}. "
+        "The rooms behind it, whose other names may change with any version:\n\n"
         + "\n".join(rooms)
-        + "\n\nNames that begin with an underscore may change at any time.\n"
+        + "\n"
     )

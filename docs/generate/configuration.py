@@ -31,8 +31,10 @@ def recipes_page() -> str:
     """Every recipe: what it is for, how it is called, all that can be set and its default."""
     parts = [
         "# Recipes",
-        "Short scripts, meant to be copied and edited. Anything below can be set by `name=value`, "
-        "in a section or group by `section.name=value`; `--help` lists it too, and "
+        "The commands of `hyuav` are short scripts: `hyuav copy train` puts one into your "
+        "directory to be edited, and `python train.py` then takes the same words. "
+        "Anything below can be set by `name=value`, in a section or group by "
+        "`section.name=value`; `--cfg job` prints it all, and "
         "`--config-dir DIR` adds files of your own. The groups `scenario` and `algorithm` are "
         "chosen by a name and changed field by field: "
         "[their fields](configuration.md).",

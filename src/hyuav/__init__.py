@@ -1,43 +1,43 @@
-"""Reinforcement learning for UAV-enabled secure offloading with a hybrid relay and jammer."""
+"""Reinforcement learning for UAV-enabled secure offloading with a hybrid relay and jammer.
 
-import os
+The stub beside this file, ``__init__.pyi``, lists the public names. Each is imported where it is
+first used, so that ``import hyuav`` takes no longer than Gymnasium, at which it registers
+``hyuav/SecureOffloading-v0``.
+"""
+
+import ast
+import importlib
+from pathlib import Path
 
 import gymnasium
 
-from hyuav._support.errors import InputError, InputTypeError
-from hyuav.envs.secure_offloading import SecureOffloadingEnv
-from hyuav.envs.transforms import make_env
-from hyuav.learning.cohort import Learner
-from hyuav.learning.ddpg import DDPG
-from hyuav.learning.registry import OWN_FILES, register, run_own_files
-from hyuav.learning.robust import RobustDDPG, RobustSAC, RobustTD3
-from hyuav.learning.sac import SAC
-from hyuav.learning.td3 import TD3
-from hyuav.learning.training import Training, TrainingParameters
-from hyuav.physics.scenario import Scenario
+__version__ = "0.1.0"
 
-__all__ = [
-    "DDPG",
-    "SAC",
-    "TD3",
-    "InputError",
-    "InputTypeError",
-    "Learner",
-    "RobustDDPG",
-    "RobustSAC",
-    "RobustTD3",
-    "Scenario",
-    "SecureOffloadingEnv",
-    "Training",
-    "TrainingParameters",
-    "make_env",
-    "register",
-]
+_ORIGINS: dict[str, tuple[str, str]] = {
+    str(alias.asname): (str(line.module), alias.name)
+    for line in ast.parse(Path(__file__).with_suffix(".pyi").read_text("utf-8")).body
+    if isinstance(line, ast.ImportFrom)
+    for alias in line.names
+}
+"""The module in which each public name is defined, and its name there."""
+
+__all__ = list(_ORIGINS)
+
+
+def __getattr__(name: str) -> object:
+    if name not in _ORIGINS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, own = _ORIGINS[name]
+    value = globals()[name] = getattr(importlib.import_module(module), own)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
 
 gymnasium.register(
     "hyuav/SecureOffloading-v0",
     entry_point="hyuav.envs.gymnasium:SecureOffloadingGymEnv",
     vector_entry_point="hyuav.envs.gymnasium:SecureOffloadingVectorEnv",
 )
-
-run_own_files(os.environ.get(OWN_FILES, ""))  # last: they import from above

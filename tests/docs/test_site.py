@@ -65,7 +65,7 @@ def test_docstrings_link_to_what_they_name(site: Path) -> None:
 
 
 def test_parameters_show_their_defaults(site: Path) -> None:
-    page = (site / "reference" / "api" / "scenario.html").read_text(encoding="utf-8")
+    page = (site / "reference" / "api" / "physics.html").read_text(encoding="utf-8")
     signature = page[page.index('id="hyuav.physics.scenario.Scenario"') :].partition(
         "</code></pre>"
     )[0]

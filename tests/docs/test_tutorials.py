@@ -58,7 +58,6 @@ def session(page: Path, directory: Path) -> str:
 def test_what_a_page_tells_to_run_runs(page: Path, tmp_path: Path) -> None:
     if page.stem in OPTIONAL:
         pytest.importorskip(OPTIONAL[page.stem])
-    (tmp_path / "recipes").symlink_to(ROOT / "recipes")
     program = session(page, tmp_path)
     environment = {
         **os.environ,

@@ -19,11 +19,20 @@ COMPARISON = (
 )
 
 
+COMMAND = "import sys; from hyuav.cli import main; sys.exit(main())"
+
+
 def start(directory: Path, recipe: str, *arguments: str) -> subprocess.Popen[str]:
-    """A recipe in a process of its own, and in a group of its own as on a terminal."""
-    path = next(path for path in RECIPES if path.stem == recipe)
+    """A recipe in a process of its own, and in a group of its own as on a terminal.
+
+    Args:
+        directory: in which it works.
+        recipe: its name, or "hyuav" with its name among the arguments.
+    """
+    by_path = {path.stem: [str(path)] for path in RECIPES}
+    program = by_path.get(recipe, ["-c", COMMAND])
     return subprocess.Popen(
-        [sys.executable, str(path), *arguments],
+        [sys.executable, *program, *arguments],
         cwd=directory,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -41,12 +50,17 @@ def wait_for(process: psutil.Process, library: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("recipe", "library"), [*((path.stem, "libtorch") for path in RECIPES), ("train", "pandas")]
+    ("call", "library"),
+    [
+        *(([path.stem], "libtorch") for path in RECIPES),
+        (["train"], "pandas"),
+        (["hyuav", "train"], "libtorch"),
+    ],
 )
 def test_an_interruption_while_it_is_loading_is_told_in_one_line(
-    tmp_path: Path, recipe: str, library: str
+    tmp_path: Path, call: list[str], library: str
 ) -> None:
-    running = start(tmp_path, recipe)
+    running = start(tmp_path, *call)
     wait_for(psutil.Process(running.pid), library)
     os.killpg(running.pid, signal.SIGINT)
     assert running.communicate() == ("", "interrupted\n")
@@ -100,16 +114,19 @@ def said_by(statements: str) -> list[str]:
     ("statements", "last"),
     [
         ("raise ValueError('no')", "ValueError: no"),
-        ("hyuav_start.loaded(); signal.raise_signal(signal.SIGINT)", "KeyboardInterrupt"),
+        ("start.loaded(); signal.raise_signal(signal.SIGINT)", "KeyboardInterrupt"),
     ],
 )
 def test_what_is_no_mistake_of_the_user_keeps_its_traceback(statements: str, last: str) -> None:
     heed = "signal.signal(signal.SIGINT, signal.default_int_handler)"  # a shell may have it ignored
-    first, *_, told = said_by(f"{heed}; import hyuav_start; {statements}")
+    first, *_, told = said_by(f"{heed}; from hyuav._support import start; {statements}")
     assert first == "Traceback (most recent call last):"
     assert told == last
 
 
 def test_a_signal_that_is_ignored_stays_so() -> None:
     ignore = "signal.signal(signal.SIGINT, signal.SIG_IGN)"
-    assert said_by(f"{ignore}; import hyuav_start; signal.raise_signal(signal.SIGINT)") == []
+    assert (
+        said_by(f"{ignore}; from hyuav._support import start; signal.raise_signal(signal.SIGINT)")
+        == []
+    )

@@ -1,7 +1,5 @@
 """Hydra for the recipes: typed defaults by name, and one line for every mistake."""
 
-from hyuav_start import loaded
-
 import argparse
 import contextlib
 import dataclasses
@@ -38,7 +36,9 @@ from hyuav._support.errors import (
 )
 from hyuav._support.interruption import interrupted_by_sigterm
 from hyuav._support.parameters import Parameters, mapping, refuse_unknown
+from hyuav._support.start import loaded, program
 from hyuav.experiments.configuration_files import read_files_as_data
+from hyuav.experiments.usage import usage
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.physics.scenario import PRESETS, Scenario
 
@@ -122,6 +122,11 @@ def recipe(
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
             register(groups)
+            if not {"-h", "--help"}.isdisjoint(sys.argv[1:]):
+                offered = {group: (member, _members(group)) for group, member in groups.items()}
+                told = usage(name, function.__globals__["__doc__"], node, offered, sections)
+                sys.stdout.write(f"{told}\n")  # at once, as what is piped to may end early
+                return
             with _ending_in_one_line(lambda: composed):
                 loaded()  # from here on an interruption is answered
                 _refuse_overrides(node, groups)
@@ -203,8 +208,7 @@ def _refuse_overrides(node: Mapping[str, Any], groups: Iterable[str]) -> None:
         name, _, value = argument.partition("=")
         entry = name.lstrip("+~")
         if entry in groups and (name.startswith("~") or value.startswith("[")):
-            offered = sorted(member.removesuffix(".yaml") for member in repository[entry])
-            require_choice(name, value, offered)
+            require_choice(name, value, _members(entry))
         path = entry.split(".")
         below: Any = known
         for depth, key in enumerate(path):
@@ -214,6 +218,12 @@ def _refuse_overrides(node: Mapping[str, Any], groups: Iterable[str]) -> None:
             if key not in below:
                 break
             below = below[key]
+
+
+def _members(group: str) -> list[str]:
+    """What a group offers, by name."""
+    offered = ConfigStore.instance().repo[group]
+    return sorted(member.removesuffix(".yaml") for member in offered)
 
 
 def _plain(
@@ -271,7 +281,7 @@ def telling_how_to_go_on(
         Interrupted: in place of any other interruption, with the command.
         Halted: with the command where going on is possible; in place of an OSError too.
     """
-    hint = f"go on with: {shlex.join([sys.orig_argv[0], sys.argv[0], *overrides])}"
+    hint = f"go on with: {shlex.join([*program(), *overrides])}"
     try:
         with interrupted_by_sigterm(), _halting(""):
             yield

@@ -252,3 +252,21 @@ class RunDirectory:
     def metrics(self) -> pd.DataFrame:
         """What training brought, as :func:`hyuav.experiments.metrics.read_metrics` reads it."""
         return read_metrics(self.metrics_file)
+
+
+def load(path: str | Path) -> RunDirectory:
+    """A run that was kept: its configuration, its metrics and its best weights.
+
+    Args:
+        path: of the run's directory.
+
+    Raises:
+        InputError: there is no run here, or its ``config.yaml`` is not one.
+
+    Example:
+        >>> run = load("runs/NAME")
+        >>> run.metrics().groupby("learner")["best_evaluation"].last()
+    """
+    run = RunDirectory(path)
+    run.configuration()
+    return run

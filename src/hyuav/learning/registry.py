@@ -95,3 +95,6 @@ def _failure(error: BaseException, path: str) -> str:
     lines = [frame.lineno for frame in frames if frame.filename == str(Path(path).absolute())]
     line = f", line {lines[-1]}" if lines else ""
     return one_line(f"{Path(path).name}{line}: {type(error).__name__}: {error}")
+
+
+run_own_files(os.environ.get(OWN_FILES, ""))  # last: they import from above

@@ -1,9 +1,9 @@
-"""What a recipe imports before all else, so that it ends in one line while it is still loading.
+"""What a program imports before all else, so that it ends in one line while it is still loading.
 
 Loading takes seconds, in which nothing is done that would have to be kept. Until :func:`loaded`,
 Ctrl-C therefore ends the program at once, with status 130; in the worker of a program it does
-nothing, since the program ends its workers. An ``InputError`` that nobody answers, such as that of
-a user's own algorithm while ``hyuav`` is imported, ends it with status 2.
+nothing, since the program ends its workers. An ``InputError`` that nobody answers ends it with
+status 2.
 """
 
 import multiprocessing
@@ -11,6 +11,16 @@ import os
 import signal
 import sys
 from types import FrameType, TracebackType
+
+from hyuav._support.errors import InputError
+
+called: list[str] = []
+"""The words of the command, such as ``hyuav train``; none where Python was given a file to run."""
+
+
+def program() -> list[str]:
+    """The words that call this program again; its arguments go behind them."""
+    return called or [sys.orig_argv[0], sys.argv[0]]
 
 
 def loaded() -> None:
@@ -25,10 +35,7 @@ def _end(number: int, _: FrameType | None) -> None:
 
 
 def _tell(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
-    errors = sys.modules.get(
-        "hyuav._support.errors"
-    )  # importing it here could raise the same again
-    if errors is None or not isinstance(error, errors.InputError):
+    if not isinstance(error, InputError):
         sys.__excepthook__(kind, error, traceback)
         return
     print(f"error: {error}", file=sys.stderr)
