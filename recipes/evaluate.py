@@ -38,7 +38,7 @@ from hyuav.experiments.experiment import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunDirectory, require_writable
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
 from hyuav.viz.html.page import write_run_report
-from hyuav.viz.paper import save_flight_map
+from hyuav.viz.paper.flights import save_flight_map
 
 
 @dataclass(frozen=True)

@@ -51,8 +51,9 @@ from hyuav.learning.training import TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.physics.slot import SCHEMES
 from hyuav.references.optimum import require_resolution
+from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
 from hyuav.viz.html.page import write_run_report
-from hyuav.viz.paper.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
+from hyuav.viz.paper.gallery import FIGURES, draw
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from hyuav import Scenario
 from hyuav.viz.dashboard import draft
 from hyuav.viz.dashboard.index import RunIndex
 from hyuav.viz.dashboard.plain import plain
+from hyuav.viz.data.schemes import scheme_label
+from hyuav.viz.html import style
 from hyuav.viz.html.html import Page, Section, render
-from hyuav.viz.html.style import scheme_label
 from hyuav.viz.html.tables import configuration_tables, html_table
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0),))
@@ -44,8 +45,7 @@ def show(name: str) -> None:
     for tag, attributes in Tags(str(content)).found:
         assert tag in OWN_TAGS
         assert not any(attribute.startswith("on") for attribute in attributes)
-    label = scheme_label(name)
-    assert "<" not in label
+    assert "<" not in style.plain(scheme_label(name))
     assert "<" not in plain(name).replace("\\<", "")
     assert "\n" not in plain(name)
 

@@ -105,7 +105,7 @@ def draw_flight(
         raise InputError(rejection("positions", path.shape, "shape (T + 1, 2)"))
     if relays.shape != (len(path) - 1,):
         raise InputError(rejection("modes", relays.shape, f"shape {(len(path) - 1,)}"))
-    for relay, first, last in _runs_of_one_mode(relays):
+    for relay, first, last in runs_of_one_mode(relays):
         axes.plot(*path[first : last + 1].T, **_slot_style(color, relay=relay) | {"marker": ""})
         axes.plot(*path[first + 1 : last + 1].T, **_slot_style(color, relay=relay) | _DOTS_ONLY)
     edge = {"markeredgecolor": "white", "markeredgewidth": _width(0.5)}
@@ -261,7 +261,7 @@ def _slot_style(color: str, *, relay: bool) -> dict[str, Any]:
     }
 
 
-def _runs_of_one_mode(relays: NDArray[np.bool_]) -> Iterator[tuple[bool, int, int]]:
+def runs_of_one_mode(relays: NDArray[np.bool_]) -> Iterator[tuple[bool, int, int]]:
     """Mode, first slot and end of each longest run, so that dashes go on over the slots."""
     changes = np.flatnonzero(relays[1:] != relays[:-1]) + 1
     bounds = [0, *changes.tolist(), len(relays)] if len(relays) else []

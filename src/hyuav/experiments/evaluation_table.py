@@ -3,6 +3,7 @@
 from rich.console import Console
 
 from hyuav._support.errors import harmless
+from hyuav._support.formatting import interval, percent
 from hyuav._support.terminal import print_table, results_table
 from hyuav.experiments.evaluation import LABELS, Evaluation
 
@@ -28,11 +29,11 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         rate = result["secrecy_sum_rate"]
         table.add_row(
             LABELS[scheme],
-            "{:.2f} [{:.2f}, {:.2f}]".format(rate["mean"], *rate["ci95"]),
-            _percent(result.get("fraction_of_optimum")),
-            _percent(result.get("fraction_of_hybrid_optimum")),
-            _percent(result["relay_share"]),
-            _percent(result["offloading_share"]),
+            interval(rate["mean"], *rate["ci95"]),
+            percent(result.get("fraction_of_optimum")),
+            percent(result.get("fraction_of_hybrid_optimum")),
+            percent(result["relay_share"]),
+            percent(result["offloading_share"]),
             f"{result['off_map']:.1f}",
         )
     print_table(table, console)
@@ -40,7 +41,3 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         if result["budget_violations"] > 0:
             count = f"{result['budget_violations']:.2f}"
             console.print(f"{LABELS[scheme]}: {count} energy budgets exceeded per episode")
-
-
-def _percent(fraction: float | None) -> str:
-    return "-" if fraction is None else f"{100 * fraction:.1f} %"

@@ -25,7 +25,7 @@ def test_the_optimum_of_the_page_is_that_of_the_solver() -> None:
     assert coarse.path.equal(expected.path)
 
 
-def test_the_coarse_grid_holds_the_longest_way_of_a_slot() -> None:
+def test_the_coarse_grid_holds_the_longest_step_of_a_slot() -> None:
     for speed in (1.0, 7.0, 20.0, 1000.0):
         scenario = dataclasses.replace(SCENARIO, max_speed=speed)
         spacing = resolution(scenario, fine=False)

@@ -9,12 +9,11 @@ from hyuav.physics.slot import SCHEMES, SecureOffloadingSystem
 from hyuav.viz.dashboard.flying import flown
 from hyuav.viz.dashboard.overlay import (
     CLICK_TRACE,
-    MODES,
     add_flights,
     explorer_map,
-    offloading_counts,
 )
-from hyuav.viz.html.style import scheme_color
+from hyuav.viz.data.maps import RULE_MODES, helper_map
+from hyuav.viz.data.schemes import scheme_color
 
 
 @pytest.mark.parametrize("crowded", [False, True])
@@ -32,7 +31,8 @@ def test_the_counts_are_of_the_ues_that_offload_there(crowded: bool) -> None:
         better = relay if relay.sum_rate > jamming.sum_rate else jamming
         for rule, outcome in zip(SCHEMES, (better, relay, jamming), strict=True):
             expected = int(outcome.offloading.sum())
-            assert offloading_counts(scenario, rule, 20.0)[at] == expected
+            counts = helper_map(scenario, 20.0).offloading(RULE_MODES[rule])
+            assert counts[at] == expected
 
 
 def test_moving_the_eavesdropper_changes_the_map() -> None:
@@ -45,7 +45,7 @@ def test_moving_the_eavesdropper_changes_the_map() -> None:
 def test_the_map_shows_the_modes_that_may_be_chosen(rule: str) -> None:
     rates = explorer_map(SCENARIO, rule, "rate").data[0]
     other = {"relay": "jamming", "jamming": "relay", "hybrid": "relay"}[rule]
-    assert set(MODES) == set(SCHEMES)
+    assert set(RULE_MODES) == set(SCHEMES)
     assert np.asarray(rates.z).max() > 0
     assert not np.array_equal(rates.z, explorer_map(SCENARIO, other, "rate").data[0].z)
 

@@ -61,18 +61,18 @@ def learner_label(learner: Learner, scenario: Scenario) -> str:
 def resolution(scenario: Scenario, *, fine: bool) -> float:
     """The grid spacing in m with which the optimum is found.
 
-    The coarse one is a whole fraction of the longest way along an axis in a slot.
+    The coarse one is a whole fraction of the longest step along an axis in a slot.
 
     Raises:
         InputError: the helper is too slow, or the scenario too large, to be solved meanwhile.
     """
     _require_size(scenario)
-    way = scenario.max_speed * scenario.slot_duration
-    if way * _MOST_SPACINGS < scenario.map_side:
+    step = scenario.max_speed * scenario.slot_duration
+    if step * _MOST_SPACINGS < scenario.map_side:
         least = scenario.map_side / (_MOST_SPACINGS * scenario.slot_duration)
         accepted = f"at least {least:.4g} m/s for the optimum on this page"
         raise InputError(rejection("max_speed", scenario.max_speed, accepted))
-    coarse = way / math.ceil(way * _COARSE_SPACINGS / scenario.map_side)
+    coarse = step / math.ceil(step * _COARSE_SPACINGS / scenario.map_side)
     return min(RESOLUTION * scenario.map_side / 200, coarse) if fine else coarse
 
 

@@ -10,10 +10,11 @@ import plotly.graph_objects as go
 import streamlit as st
 
 from hyuav._support.errors import InputError
-from hyuav.viz.dashboard.curves import X_AXES, Choice, axes_of, comparison
+from hyuav.viz.dashboard.curves import X_AXES, Choice, comparison
 from hyuav.viz.dashboard.index import MOST_DRAWN, STATES, RunEntry, RunIndex
 from hyuav.viz.dashboard.plain import plain, refusals
-from hyuav.viz.dashboard.tables import differences, outcomes
+from hyuav.viz.data.configuration import differences
+from hyuav.viz.data.curves import last_results, quantities
 
 KEPT = (
     *("search", "scenarios", "algorithms", "schemes", "states"),
@@ -194,7 +195,7 @@ def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
         st.info("No episode of this quantity is complete yet.")
         return
     st.plotly_chart(figure, key="curves", theme=None, config={"displaylogo": False})
-    reached = outcomes(metrics, choice)
+    reached = last_results(metrics, choice.y)
     st.dataframe(reached, hide_index=True, column_config={"Run": _name_column(metrics)})
     if len(metrics) > 1:
         st.subheader("What sets these runs apart", anchor=False)
@@ -244,14 +245,12 @@ def _figure(
 
 
 def _choice(metrics: Mapping[str, pd.DataFrame]) -> Choice:
-    quantities = axes_of(metrics)
+    names = quantities(metrics)
     what, against, smoothing, colors = st.columns([3, 3, 3, 2])
-    if st.session_state.get("quantity") not in quantities:
-        st.session_state["quantity"] = next(iter(quantities), None)
+    if st.session_state.get("quantity") not in names:
+        st.session_state["quantity"] = next(iter(names), None)
     return Choice(
-        y=what.selectbox(
-            "Quantity", list(quantities), format_func=quantities.__getitem__, key="quantity"
-        ),
+        y=what.selectbox("Quantity", list(names), format_func=names.__getitem__, key="quantity"),
         x=against.selectbox("Against", list(X_AXES), format_func=X_AXES.__getitem__, key="against"),
         smoothing=smoothing.slider(
             "Smoothing (episodes)",

@@ -4,7 +4,7 @@ import numpy as np
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.html.player_flight import Flight
+from hyuav.viz.data.flights import Flight, budgets
 from hyuav.viz.html.player_map import Trace, trace
 from hyuav.viz.html.style import translucent
 
@@ -20,7 +20,7 @@ def highest(flight: Flight) -> list[float]:
 
 def fixed_in_panels(flight: Flight) -> list[Trace]:
     """The sum-rates that each mode would have brought, slot by slot."""
-    slots = list(range(1, len(flight.relay) + 1))
+    slots = list(range(1, flight.num_slots + 1))
     rates = flight.rows[["relay_sum_rate", "jamming_sum_rate"]].to_numpy(float).round(4)
     return [
         trace(
@@ -47,16 +47,13 @@ def moving_in_panels(scenario: Scenario, flight: Flight, slot: int, color: str) 
 def _bars(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Trace]:
     """The slot's secrecy rates, and its energies as shares of the budgets."""
     ues = [str(index + 1) for index in range(scenario.num_ues)]
-    budgets = np.array(
-        [scenario.ue_energy_budget] * len(ues)
-        + [scenario.edge_energy_budget, scenario.helper_energy_budget]
-    )
+    available = np.array(list(budgets(scenario).values()))
     spent, rates = flight.energy[slot], flight.secrecy_rate[slot].round(4)
-    shares = 100 * np.divide(spent, budgets, out=np.zeros_like(spent), where=budgets > 0)
+    shares = 100 * np.divide(spent, available, out=np.zeros_like(spent), where=available > 0)
     units = np.array([1e3] * len(ues) + [1.0, 1.0])
     told = [
         f"{unit * value:.4g} of {unit * budget:g} {'J' if unit == 1 else 'mJ'}"
-        for value, budget, unit in zip(spent, budgets, units, strict=True)
+        for value, budget, unit in zip(spent, available, units, strict=True)
     ]
     labelled = scenario.num_ues <= _LABELLED_UES
     label_style = {"textposition": "outside", "cliponaxis": False, "constraintext": "none"}
