@@ -41,7 +41,7 @@ from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.slot import SCHEMES
-from hyuav.viz.html.page import write_run_report
+from hyuav.viz.html.page import write_report
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def tell(run: RunDirectory, console: Console) -> None:
     returns = ", ".join(f"{value:.2f}" for value in best)
     print_line(f"best noise-free accumulated reward (bps/Hz): {returns}", console)
     print_line(f"run: {run.path}", console)
-    print_line(f"its report: {write_run_report(run.path).name}", console)
+    print_line(f"its report: {write_report(run.path).name}", console)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,8 @@
 """What an evaluation found, as a table for the terminal."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from rich.console import Console
 
 from hyuav._support.errors import harmless
@@ -26,18 +29,30 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         "off\nmap",
     )
     for scheme, result in summary["schemes"].items():
-        rate = result["secrecy_sum_rate"]
-        table.add_row(
-            LABELS[scheme],
-            interval(rate["mean"], *rate["ci95"]),
-            percent(result.get("fraction_of_optimum")),
-            percent(result.get("fraction_of_hybrid_optimum")),
-            percent(result["relay_share"]),
-            percent(result["offloading_share"]),
-            f"{result['off_map']:.1f}",
-        )
+        table.add_row(LABELS[scheme], *flight_cells(result))
     print_table(table, console)
     for scheme, result in summary["schemes"].items():
         if result["budget_violations"] > 0:
             count = f"{result['budget_violations']:.2f}"
             console.print(f"{LABELS[scheme]}: {count} energy budgets exceeded per episode")
+
+
+def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
+    """How a scheme flew, as text.
+
+    Args:
+        result: of the scheme, in the summary.
+
+    Returns:
+        the secrecy sum-rate with its interval, the fractions of the scheme's own and of the hybrid
+        optimum, the shares of relay slots and of UEs offloading, and the slots off the map.
+    """
+    rate = result["secrecy_sum_rate"]
+    return (
+        interval(rate["mean"], *rate["ci95"]),
+        percent(result.get("fraction_of_optimum")),
+        percent(result.get("fraction_of_hybrid_optimum")),
+        percent(result["relay_share"]),
+        percent(result["offloading_share"]),
+        f"{result['off_map']:.1f}",
+    )

@@ -2,8 +2,7 @@
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 import plotly.graph_objects as go
@@ -210,36 +209,25 @@ def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
             st.dataframe(table)
 
 
-@dataclass(frozen=True)
-class _Shown:
+class _Shown(NamedTuple):
     """The figure of the last renewal, and what it was made of."""
 
-    metrics: Mapping[str, pd.DataFrame]
-    optima: Mapping[str, Mapping[str, float]]
-    choice: Choice
     figure: go.Figure
-
-    def shows(
-        self,
-        metrics: Mapping[str, pd.DataFrame],
-        optima: Mapping[str, Mapping[str, float]],
-        choice: Choice,
-    ) -> bool:
-        """Whether it was made of the same, where metrics without new rows are the same table."""
-        return (
-            (self.optima, self.choice) == (optima, choice)
-            and list(self.metrics) == list(metrics)
-            and all(rows is metrics[name] for name, rows in self.metrics.items())
-        )
+    metrics: Mapping[str, pd.DataFrame]
+    made_of: tuple[Any, ...]
 
 
 def _figure(
     metrics: Mapping[str, pd.DataFrame], optima: Mapping[str, Mapping[str, float]], choice: Choice
 ) -> go.Figure:
-    """The figure, made anew only where something has changed."""
+    """The figure, made anew only where something has changed.
+
+    Metrics without new rows are the same table as before.
+    """
     shown: _Shown | None = st.session_state.get("shown")
-    if shown is None or not shown.shows(metrics, optima, choice):
-        shown = _Shown(metrics, optima, choice, comparison(metrics, optima, choice))
+    made_of = optima, choice, [(name, id(rows)) for name, rows in metrics.items()]
+    if shown is None or shown.made_of != made_of:
+        shown = _Shown(comparison(metrics, optima, choice), metrics, made_of)
         st.session_state["shown"] = shown
     return shown.figure
 

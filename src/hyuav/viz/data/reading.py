@@ -39,13 +39,18 @@ def read_evaluation(directory: Path) -> dict[str, Any]:
     Raises:
         InputError: there is none, or it is damaged or another program's.
     """
+    file = _existing(directory, EVALUATION_FILE)
     content = readable_evaluation(directory)
     if content is None:
-        raise InputError(
-            f"{directory / EVALUATION_FILE}: expected an evaluation in JSON "
-            "(recipes/evaluate.py makes it)"
-        )
+        raise InputError(f"{file}: expected an evaluation in JSON (recipes/evaluate.py makes it)")
     return content
+
+
+def _existing(directory: Path, name: str) -> Path:
+    file = directory / name
+    if not file.exists():
+        raise InputError(f"there is no {name} in {directory} (recipes/evaluate.py makes it)")
+    return file
 
 
 def readable_evaluation(directory: Path) -> dict[str, Any] | None:
@@ -90,7 +95,7 @@ def read_flights(directory: Path) -> pd.DataFrame:
     Raises:
         InputError: there are none, or they are damaged or another program's.
     """
-    file, accepted = directory / FLIGHTS_FILE, "the flights of an evaluation"
+    file, accepted = _existing(directory, FLIGHTS_FILE), "the flights of an evaluation"
     if not file.is_file():
         raise InputError(f"{file}: expected {accepted} in Parquet (not a file)")
     table = read_parquet(file, accepted)

@@ -67,9 +67,9 @@ class FinishedRun:
         Raises:
             InputError: no scheme was evaluated, the file is damaged, or another scenario's.
         """
-        file = self._existing(FLIGHTS_FILE)
         flights = read_flights(self.run.path)
         if not is_drawable(flights, self.scenario.num_ues):
+            file = self.run.path / FLIGHTS_FILE
             raise InputError(f"{file}: expected flights over {self.scenario.num_ues} UEs")
         return flights
 
@@ -80,7 +80,6 @@ class FinishedRun:
         Raises:
             InputError: there is none, or the file is damaged.
         """
-        self._existing(EVALUATION_FILE)
         return read_evaluation(self.run.path)
 
     @property
@@ -136,14 +135,6 @@ class FinishedRun:
             return {}
         is_own = self.summary["num_slots"] == self.scenario.num_slots
         return optima_of(self.summary) if is_own else {}
-
-    def _existing(self, name: str) -> Path:
-        file = self.run.path / name
-        if not file.exists():
-            raise InputError(
-                f"there is no {name} in {self.run.path} (recipes/evaluate.py makes it)"
-            )
-        return file
 
 
 def _is_evaluated(directory: Path) -> bool:

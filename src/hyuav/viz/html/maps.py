@@ -4,7 +4,12 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from hyuav.envs.rendering import EAVESDROPPER_COLOR, LEGITIMATE_COLOR
+from hyuav.envs.rendering import (
+    EAVESDROPPER_COLOR,
+    EAVESDROPPER_LABEL,
+    LEGITIMATE_COLOR,
+    LEGITIMATE_LABEL,
+)
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.maps import HelperMap, Mode, helper_map
 from hyuav.viz.html.style import base_layout, square_map, translucent
@@ -93,9 +98,9 @@ def _add_nodes(figure: go.Figure, scenario: Scenario) -> None:
     )
     nodes = (
         ("UE", x, y, {"size": 6, "color": "#000000"}),
-        ("legitimate UAV (L)", *_at(scenario.legitimate_position, "square", LEGITIMATE_COLOR)),
+        (LEGITIMATE_LABEL, *_at(scenario.legitimate_position, "square", LEGITIMATE_COLOR)),
         (
-            "eavesdropper (E)",
+            EAVESDROPPER_LABEL,
             *_at(scenario.eavesdropper_position, "triangle-down", EAVESDROPPER_COLOR),
         ),
     )

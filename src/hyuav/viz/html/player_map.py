@@ -8,7 +8,10 @@ from numpy.typing import NDArray
 
 from hyuav.envs.rendering import (
     EAVESDROPPER_COLOR,
+    EAVESDROPPER_LABEL,
+    HELPER_LABEL,
     LEGITIMATE_COLOR,
+    LEGITIMATE_LABEL,
     OKABE_ITO,
     runs_of_one_mode,
 )
@@ -59,11 +62,11 @@ def moving_on_map(scenario: Scenario, flight: Flight, slot: int, color: str) -> 
         *_flown(flight, slot, color),
         *_links(scenario, flight.offloading[slot], helper, relay=relay),
         *_ues(scenario, flight, slot, helper),
-        _uav(scenario.legitimate_position, "legitimate UAV (L)", "square", LEGITIMATE_COLOR),
+        _uav(scenario.legitimate_position, LEGITIMATE_LABEL, "square", LEGITIMATE_COLOR),
         _uav(
-            scenario.eavesdropper_position, "eavesdropper (E)", "triangle-down", EAVESDROPPER_COLOR
+            scenario.eavesdropper_position, EAVESDROPPER_LABEL, "triangle-down", EAVESDROPPER_COLOR
         ),
-        _uav(helper, "helper UAV (H)", "circle-open", color),
+        _uav(helper, HELPER_LABEL, "circle-open", color),
     ]
 
 

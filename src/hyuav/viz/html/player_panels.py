@@ -1,5 +1,7 @@
 """The player's panels: each slot's secrecy rates and energies, and the sum-rates of all slots."""
 
+from typing import Any
+
 import numpy as np
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR
@@ -23,20 +25,24 @@ def fixed_in_panels(flight: Flight) -> list[Trace]:
     slots = list(range(1, flight.num_slots + 1))
     rates = flight.rows[["relay_sum_rate", "jamming_sum_rate"]].to_numpy(float).round(4)
     return [
-        trace(
+        _panel(
+            4,
             "scatter",
             x=slots,
             y=rates[:, column].tolist(),
             name=name,
             mode="lines",
             line={"color": "#8A8A8A", "width": 1.2, "dash": dash},
-            showlegend=False,
             hovertemplate=f"slot %{{x}}: %{{y:.2f}} bps/Hz if {name}<extra></extra>",
-            xaxis="x4",
-            yaxis="y4",
         )
         for column, (name, dash) in enumerate((("relaying", "solid"), ("jamming", "6px,4px")))
     ]
+
+
+def _panel(number: int, kind: str, **values: Any) -> Trace:
+    """A trace in one of the panels, which the legend leaves out."""
+    axes = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+    return trace(kind, **values, **axes, showlegend=False)
 
 
 def moving_in_panels(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Trace]:
@@ -56,36 +62,32 @@ def _bars(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Tra
         for value, budget, unit in zip(spent, available, units, strict=True)
     ]
     labelled = scenario.num_ues <= _LABELLED_UES
+    rate_texts = [f"{rate:.2f}" if rate else "" for rate in rates]
+    energy_texts = [_short(unit * value) for value, unit in zip(spent, units, strict=True)]
     label_style = {"textposition": "outside", "cliponaxis": False, "constraintext": "none"}
     label_style |= {"textangle": 0, "textfont": {"size": 9}}
     return [
-        trace(
+        _panel(
+            2,
             "bar",
             x=ues,
             y=rates.tolist(),
             name="secrecy rate",
             marker={"color": color},
-            showlegend=False,
-            text=[f"{rate:.2f}" if rate else "" for rate in rates] if labelled else None,
+            text=rate_texts if labelled else None,
             hovertemplate="UE %{x}: %{y:.3f} bps/Hz<extra></extra>",
-            xaxis="x2",
-            yaxis="y2",
             **label_style,
         ),
-        trace(
+        _panel(
+            3,
             "bar",
             x=[*ues, "L", "H"],
             y=shares.round(2).tolist(),
             name="energy",
             marker={"color": ["#8A8A8A"] * len(ues) + [LEGITIMATE_COLOR, color]},
-            showlegend=False,
-            text=[_short(unit * value) for value, unit in zip(spent, units, strict=True)]
-            if labelled
-            else None,
+            text=energy_texts if labelled else None,
             customdata=told,
             hovertemplate="%{x}: %{customdata}, %{y:.1f} %<extra></extra>",
-            xaxis="x3",
-            yaxis="y3",
             **label_style,
         ),
     ]
@@ -98,17 +100,17 @@ def _short(value: float) -> str:
 def _sum_rates(flight: Flight, slot: int, color: str) -> list[Trace]:
     """The secrecy sum-rates earned up to the slot, and a mark at the slot."""
     earned = flight.rows["secrecy_sum_rate"].to_numpy(float).round(4)
-    common = {"showlegend": False, "xaxis": "x4", "yaxis": "y4"}
     return [
-        trace(
+        _panel(
+            4,
             "bar",
             x=list(range(1, slot + 2)),
             y=earned[: slot + 1].tolist(),
             marker={"color": translucent(color, 0.45)},
             hovertemplate="slot %{x}: %{y:.2f} bps/Hz earned<extra></extra>",
-            **common,
         ),
-        trace(
+        _panel(
+            4,
             "scatter",
             x=[slot + 1],
             y=[float(earned[slot])],
@@ -116,6 +118,5 @@ def _sum_rates(flight: Flight, slot: int, color: str) -> list[Trace]:
             marker={"size": 11, "color": color, "line": {"color": "white", "width": 1.5}},
             hovertemplate="slot %{x}: %{y:.2f} bps/Hz earned<extra></extra>",
             cliponaxis=False,
-            **common,
         ),
     ]

@@ -6,8 +6,9 @@ from typing import Any
 import pandas as pd
 from markupsafe import Markup, escape
 
-from hyuav._support.formatting import bounds, interval, or_never, percent
+from hyuav._support.formatting import bounds, or_never, percent
 from hyuav.experiments.comparison.tables import label
+from hyuav.experiments.evaluation_table import flight_cells
 from hyuav.viz.data.configuration import SYMBOLS, entries
 from hyuav.viz.data.schemes import scheme_color, scheme_label
 
@@ -55,12 +56,7 @@ def scheme_table(summary: Mapping[str, Any]) -> Markup:
     rows = [
         (
             _swatch(scheme_color(scheme), scheme_label(scheme)),
-            interval(result["secrecy_sum_rate"]["mean"], *result["secrecy_sum_rate"]["ci95"]),
-            percent(result.get("fraction_of_optimum")),
-            percent(result.get("fraction_of_hybrid_optimum")),
-            percent(result["relay_share"]),
-            percent(result["offloading_share"]),
-            f"{result['off_map']:.1f}",
+            *flight_cells(result),
             f"{1e3 * result['ue_energy']:.1f}",
             f"{result['edge_energy']:.1f}",
             f"{result['helper_energy'] / 1e3:.2f}",

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import pandas as pd
+from matplotlib.figure import Figure
 from rich.console import Console
 
 from hyuav._support.errors import InputError
@@ -26,21 +28,24 @@ from hyuav.viz.paper.maps import sum_rate_maps
 from hyuav.viz.paper.over_time import energy_by_slot, offloading_by_slot
 from hyuav.viz.paper.style import save_figure, save_tables
 
+Drawing = Callable[[FinishedRun, Path, str], None]
+"""Draws a figure of a run into a directory, under a name."""
 
-def _learning_curves(finished: FinishedRun, directory: Path, name: str) -> None:
-    table = finished.learning()
-    save_figure(learning_figure(table), directory, name, {"": table})
+
+def _of(table: Callable[[FinishedRun], pd.DataFrame], figure: Callable[..., Figure]) -> Drawing:
+    """A figure that shows one table."""
+
+    def draw_table(finished: FinishedRun, directory: Path, name: str) -> None:
+        shown = table(finished)
+        save_figure(figure(shown), directory, name, {"": shown})
+
+    return draw_table
 
 
 def _trajectories(finished: FinishedRun, directory: Path, name: str) -> None:
     scenario, flights = finished.flown, finished.flights
     tables = flight_tables(scenario, flights, TRAJECTORIES)
     save_figure(trajectories(scenario, flights), directory, name, tables)
-
-
-def _horizons(finished: FinishedRun, directory: Path, name: str) -> None:
-    table = finished.horizons()
-    save_figure(sum_rates_by_horizon(table), directory, name, {"": table})
 
 
 def _flight_map(finished: FinishedRun, directory: Path, name: str) -> None:
@@ -52,16 +57,6 @@ def _sum_rate_maps(finished: FinishedRun, directory: Path, name: str) -> None:
     save_figure(sum_rate_maps(finished.scenario, table), directory, name, {"": table})
 
 
-def _energy(finished: FinishedRun, directory: Path, name: str) -> None:
-    table = energy_table(finished.flown, finished.flights)
-    save_figure(energy_by_slot(table), directory, name, {"": table})
-
-
-def _offloading(finished: FinishedRun, directory: Path, name: str) -> None:
-    table = offloading_table(finished.flown, finished.flights)
-    save_figure(offloading_by_slot(table), directory, name, {"": table})
-
-
 def _animation(finished: FinishedRun, directory: Path, name: str) -> None:
     shown = next(name for name in (*COMPARED, *LABELS) if name in set(finished.flights["scheme"]))
     flight = read_flight(finished.flown, finished.flights, shown)
@@ -69,17 +64,19 @@ def _animation(finished: FinishedRun, directory: Path, name: str) -> None:
     save_tables(directory, name, {"": flight.rows})
 
 
-FIGURES: dict[str, Callable[[FinishedRun, Path, str], None]] = {
-    "learning_curves": _learning_curves,
+FIGURES: dict[str, Drawing] = {
+    "learning_curves": _of(FinishedRun.learning, learning_figure),
     "trajectories": _trajectories,
-    "horizons": _horizons,
+    "horizons": _of(FinishedRun.horizons, sum_rates_by_horizon),
     "flight_map": _flight_map,
     "sum_rate_maps": _sum_rate_maps,
-    "energy": _energy,
-    "offloading": _offloading,
+    "energy": _of(lambda finished: energy_table(finished.flown, finished.flights), energy_by_slot),
+    "offloading": _of(
+        lambda finished: offloading_table(finished.flown, finished.flights), offloading_by_slot
+    ),
     "animation": _animation,
 }
-"""What draws each figure into a directory under a name; the first three are the paper's."""
+"""By their names; the first three are the paper's."""
 
 
 def draw(run: RunDirectory, names: Sequence[str] | None, console: Console) -> None:
