@@ -16,7 +16,7 @@ from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.experiments.comparison.statistics import performance_profiles
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.learning.registry import PEER
-from hyuav.viz.data.reading import readable_table
+from hyuav.viz.data.reading import readable_config, readable_table
 
 _OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
 
@@ -47,6 +47,12 @@ def entry_line(entry: str) -> int:
     return 1 + PIECES.index(piece) // len(_OTHERS) if piece in PIECES else 0
 
 
+def is_comparison(directory: Path) -> bool:
+    """Whether a directory holds a comparison, however much of it is there yet, and no run."""
+    begun = (directory / "shards").is_dir() or (directory / RESULTS_FILE).is_file()
+    return begun or "hyperparameters" in readable_config(directory)
+
+
 def profiles(results: pd.DataFrame) -> pd.DataFrame:
     """The share of learners that reach each share of the optimum, from where some do not.
 
@@ -74,15 +80,15 @@ class ReadableComparison:
 
     Args:
         directory: of the comparison.
-        config: that stands there, which may be damaged or of another version.
     """
 
-    def __init__(self, directory: Path, config: Mapping[str, Any]) -> None:
-        self.directory = directory
-        value = config.get("threshold")
-        known = isinstance(value, int | float) and 0 <= value <= 1
-        self.threshold: float = float(value) if known else 0.97
-        self._asked = _Asked.of(config)
+    def __init__(self, directory: Path) -> None:
+        self.directory, self.config = directory, readable_config(directory)
+        value = self.config.get("threshold")
+        self.threshold = 0.97
+        if isinstance(value, int | float) and 0 <= value <= 1:
+            self.threshold = float(value)
+        self._asked = _Asked.of(self.config)
 
     @property
     def results(self) -> pd.DataFrame | None:

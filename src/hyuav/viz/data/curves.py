@@ -90,11 +90,12 @@ def learning_curves(
         return
     rows = metrics.dropna(subset=["episode", against, "learner", "num_slots", quantity])
     rows = rows.assign(scheme=rows["scheme"].replace(LEARNED))
-    for (scheme, num_slots), own in rows.groupby(["scheme", "num_slots"], sort=False):
+    for (scheme, _), own in rows.groupby(["scheme", "num_slots"], sort=False):
         episodes = np.unique(own["episode"])
         spacing = float(np.median(np.diff(episodes))) if len(episodes) > 1 else 1.0
+        num_slots = int(own["num_slots"].iloc[0])
         learners = own.pivot_table(quantity, against, "learner")
-        yield LearningCurve(str(scheme), int(num_slots), spacing, learners)
+        yield LearningCurve(str(scheme), num_slots, spacing, learners)
 
 
 def learning_table(

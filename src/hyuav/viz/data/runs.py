@@ -14,6 +14,7 @@ from hyuav.experiments.evaluation import (
     EVALUATION_FILE,
     FLIGHTS_FILE,
     OPTIMA,
+    Evaluation,
     EvaluationParameters,
     Policy,
     evaluate,
@@ -171,23 +172,17 @@ def horizon_table(summaries: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-@dataclasses.dataclass(frozen=True)
-class Evaluated:
-    """An evaluation of a run over one horizon, with whatever of it can be read."""
+def evaluations(directory: Path, scenario: Scenario | None) -> list[Evaluation]:
+    """Those that can be read, one for each horizon: the scenario's own, then the shortest first.
 
-    summary: dict[str, Any]
-    scenario: Scenario | None
-    flights: pd.DataFrame | None
-
-
-def evaluations(directory: Path, scenario: Scenario | None) -> list[Evaluated]:
-    """Those that can be read, one for each horizon: the scenario's own, then the shortest first."""
-    found: dict[int, Evaluated] = {}
+    One whose flights cannot be read has none.
+    """
+    found: dict[int, Evaluation] = {}
     for place in evaluation_directories(directory):
-        summary = readable_evaluation(place)
-        if summary is not None and summary["num_slots"] not in found:
-            flown = evaluated_scenario(summary)[1]
-            found[summary["num_slots"]] = Evaluated(summary, flown, readable_flights(place))
+        summary, flights = readable_evaluation(place), readable_flights(place)
+        if summary is not None:
+            evaluation = Evaluation(summary, pd.DataFrame() if flights is None else flights)
+            found.setdefault(summary["num_slots"], evaluation)
     return [found[horizon] for horizon in own_first(found, scenario)]
 
 
@@ -222,12 +217,15 @@ def all_metrics(directory: Path) -> pd.DataFrame:
     return pd.concat([table for table in rows if len(table)] or rows[:1], ignore_index=True)
 
 
-def fly_now(run: RunDirectory, name: str) -> Evaluated:
+def fly_now(run: RunDirectory, name: str) -> tuple[Scenario, Evaluation]:
     """Fly the best weights and the straight flights through a few episodes.
 
     Args:
         run: whose weights they are.
         name: of its scenario.
+
+    Returns:
+        the scenario, over a horizon for which there are learners, and what came of it.
 
     Raises:
         InputError: the weights cannot be read, or do not fit.
@@ -243,5 +241,4 @@ def fly_now(run: RunDirectory, name: str) -> Evaluated:
             policies[scheme] = [Policy(straight(scenario))]
         except InputError:  # too fast for the horizon
             continue
-    evaluation = evaluate(scenario, name, policies, QUICK)
-    return Evaluated(evaluation.summary, scenario, evaluation.flights)
+    return scenario, evaluate(scenario, name, policies, QUICK)

@@ -13,7 +13,6 @@ from hyuav.experiments.evaluation import LABELS, EvaluationParameters, evaluate
 from hyuav.experiments.experiment import learned_policies
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.comparison import ReadableComparison, TrainedEntry
-from hyuav.viz.data.reading import readable_config
 from hyuav.viz.html.comparison_figures import comparison_figures
 from hyuav.viz.html.html import Page, Picture, Section
 from hyuav.viz.html.player import flight_player
@@ -28,14 +27,13 @@ _FEW = EvaluationParameters(episodes=2, flights=1)
 
 def comparison_page(directory: Path) -> Page:
     """What a comparison's directory tells, however much of it is there yet."""
-    config = readable_config(directory)
-    comparison = ReadableComparison(directory, config)
+    comparison = ReadableComparison(directory)
     threshold, results, runs = comparison.threshold, comparison.results, comparison.trained()
     sections = [
         *_results(results, comparison.curves, threshold),
         _flights(runs[:MAX_FLIGHTS]),
         map_section(dict(list(_scenarios(runs).items())[:MAX_MAPS])),
-        config_section(config),
+        config_section(comparison.config),
     ]
     facts = {"Share that counts as solved": percent(threshold, None)}
     if results is not None:

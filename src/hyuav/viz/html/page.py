@@ -4,7 +4,7 @@ from pathlib import Path
 
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.run_directory import REPORT_FILE, require_writable
-from hyuav.viz.data.reading import readable_config
+from hyuav.viz.data.comparison import is_comparison
 from hyuav.viz.html.comparison import comparison_page
 from hyuav.viz.html.html import write_page
 from hyuav.viz.html.run import run_page
@@ -27,6 +27,5 @@ def write_report(directory: str | Path) -> Path:
     if not path.is_dir():
         raise InputError(rejection("run", str(path), "an existing directory"))
     require_writable("run", path)
-    compares = (path / "shards").is_dir() or "hyperparameters" in readable_config(path)
-    page = comparison_page(path) if compares else run_page(path)
+    page = comparison_page(path) if is_comparison(path) else run_page(path)
     return write_page(page, path / REPORT_FILE)

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from hyuav._support.errors import InputError
+from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.experiment import LEARNED_AS_IN_PAPER
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.physics.scenario import Scenario
@@ -15,7 +16,6 @@ from hyuav.viz.data.maps import helper_map
 from hyuav.viz.data.reading import optima_of, readable_config
 from hyuav.viz.data.runs import (
     QUICK,
-    Evaluated,
     all_metrics,
     evaluated_scenario,
     evaluations,
@@ -48,7 +48,7 @@ def run_page(directory: Path) -> Page:
     if scenario is None and evaluated:  # kept apart from its runs
         name, scenario = evaluated_scenario(evaluated[0].summary)
     flown, note = _flown(directory, name, scenario, evaluated)
-    summaries = [own.summary for own in evaluated or flown]
+    summaries = [own.summary for own in evaluated or [own for _, own in flown]]
     sections = [
         _flights(flown, note),
         _curves(metrics, summaries, scenario),
@@ -82,11 +82,14 @@ def _facts(
 
 
 def _flown(
-    directory: Path, name: str, scenario: Scenario | None, evaluated: Sequence[Evaluated]
-) -> tuple[list[Evaluated], str]:
+    directory: Path, name: str, scenario: Scenario | None, evaluated: Sequence[Evaluation]
+) -> tuple[list[tuple[Scenario, Evaluation]], str]:
     """The flights of the evaluations, or else some flown now; and what is to be said of them."""
-    if any(own.flights is not None for own in evaluated):
-        flown = [own for own in evaluated if own.flights is not None and own.scenario is not None]
+    kept = [own for own in evaluated if len(own.flights)]
+    if kept:
+        scenarios = [evaluated_scenario(own.summary)[1] for own in kept]
+        both = zip(scenarios, kept, strict=True)
+        flown = [(of, own) for of, own in both if of is not None]
         return flown, _KEPT if flown else "The evaluation's scenario cannot be read."
     if scenario is None:
         return [], "There is no configuration to fly by."
@@ -99,18 +102,16 @@ def _flown(
         return [], f"The weights cannot be flown: {error}"
 
 
-def _flights(several: Sequence[Evaluated], note: str) -> Section:
+def _flights(several: Sequence[tuple[Scenario, Evaluation]], note: str) -> Section:
     if not several:
         return Section("Flights", [note])
     figures, notes = {}, [note]
-    for flown in several:
-        if flown.scenario is None or flown.flights is None:
-            continue
-        horizon = f"T = {flown.scenario.num_slots}: " if len(several) > 1 else ""
+    for scenario, flown in several:
+        horizon = f"T = {scenario.num_slots}: " if len(several) > 1 else ""
         for scheme in sorted(dict.fromkeys(flown.flights["scheme"]), key=scheme_place):
             label = f"{horizon}{scheme_label(scheme)}"
             try:
-                figures[label] = flight_player(flown.scenario, flown.flights, scheme)
+                figures[label] = flight_player(scenario, flown.flights, scheme)
             except InputError as error:
                 notes.append(f"{label} is left out: {error}")
     notes.append(

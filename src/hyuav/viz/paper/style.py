@@ -7,7 +7,6 @@ from typing import Any
 
 import matplotlib as mpl
 import pandas as pd
-from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
 from hyuav._support.durable import write_durably
@@ -48,7 +47,7 @@ STYLE: Any = {
 
 
 def legend_below(
-    figure: Figure, handles: Sequence[Artist], columns: int, spacing: float = 1.0, **more: Any
+    figure: Figure, handles: Sequence[Any], columns: int, spacing: float = 1.0, **more: Any
 ) -> None:
     """Place the legend below all axes, in so many columns that are ``spacing`` letters apart."""
     figure.legend(
