@@ -1,7 +1,7 @@
 """Flights slot by slot: where the helper was, what each node earned and spent."""
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -148,10 +148,9 @@ def energy_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
     """
     budget = budgets(scenario)
     tables = []
-    for scheme, flight in first_flights(scenario, flights, COMPARED).items():
+    for flight in first_flights(scenario, flights, COMPARED).values():
         columns = {
-            "scheme": scheme,
-            "slot": np.arange(1, flight.num_slots + 1).repeat(len(budget)),
+            **_slots(flight, len(budget)),
             "node": list(budget) * flight.num_slots,
             "energy": flight.energy.flatten(),
             "budget": list(budget.values()) * flight.num_slots,
@@ -172,10 +171,9 @@ def offloading_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
         ``offloading``, and its ``secrecy_rate`` in bps/Hz.
     """
     num_ues, tables = scenario.num_ues, []
-    for scheme, flight in first_flights(scenario, flights, (*COMPARED, *MODE_ROWS)).items():
+    for flight in first_flights(scenario, flights, (*COMPARED, *MODE_ROWS)).values():
         columns = {
-            "scheme": scheme,
-            "slot": np.arange(1, flight.num_slots + 1).repeat(num_ues),
+            **_slots(flight, num_ues),
             "relay": flight.relay.repeat(num_ues),
             "ue": np.tile(np.arange(1, num_ues + 1), flight.num_slots),
             "offloading": flight.offloading.flatten(),
@@ -183,3 +181,9 @@ def offloading_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
         }
         tables.append(pd.DataFrame(columns))
     return pd.concat(tables, ignore_index=True)
+
+
+def _slots(flight: Flight, rows: int) -> dict[str, Any]:
+    """Scheme and slot of a table with so many rows for each slot."""
+    slots = np.arange(1, flight.num_slots + 1)
+    return {"scheme": flight.scheme, "slot": slots.repeat(rows)}

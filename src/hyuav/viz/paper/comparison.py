@@ -135,13 +135,10 @@ def curves_figure(curves: pd.DataFrame, threshold: float) -> Figure:
         threshold: share of the optimum, drawn as a line.
     """
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
-        axes = figure.add_subplot()
-        handles = _draw_bands(axes, curves, "episode", "iqm")
+        figure, axes = _bands(curves, "episode", "iqm")
         axes.axhline(threshold, color="0.3", linewidth=0.9, linestyle=LINES["dotted"])
         axes.set(xlabel="Training episodes", ylabel=f"{FRACTION} (IQM)")
         axes.yaxis.set_major_formatter(_percent)
-        _add_legend(figure, handles)
         return figure
 
 
@@ -153,21 +150,19 @@ def profiles_figure(profiles: pd.DataFrame, threshold: float) -> Figure:
         threshold: share of the optimum, drawn as a line.
     """
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
-        axes = figure.add_subplot()
-        handles = _draw_bands(axes, profiles, "fraction", "share")
+        figure, axes = _bands(profiles, "fraction", "share")
         axes.axvline(threshold, color="0.3", linewidth=0.9, linestyle=LINES["dotted"])
         axes.set(xlabel=f"{FRACTION}, $\\tau$", ylabel="Learners that reach $\\tau$ or more")
         axes.set_ylim(-0.02, 1.04)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(_percent)
-        _add_legend(figure, handles)
         return figure
 
 
-def _draw_bands(axes: Axes, rows: pd.DataFrame, x: str, y: str) -> list[Line2D]:
-    """The lines with their bands; returned are the lines."""
-    lines = []
+def _bands(rows: pd.DataFrame, x: str, y: str) -> tuple[Figure, Axes]:
+    """A line with its band for each algorithm."""
+    figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
+    axes, lines = figure.add_subplot(), []
     for name, own in rows.groupby("algorithm", sort=False):
         hue = entry_color(str(name))
         axes.fill_between(own[x], own["low"], own["high"], color=hue, alpha=0.15, linewidth=0)
@@ -181,7 +176,8 @@ def _draw_bands(axes: Axes, rows: pd.DataFrame, x: str, y: str) -> list[Line2D]:
         )
     axes.margins(x=0.0)
     axes.grid()
-    return lines
+    _add_legend(figure, lines)
+    return figure, axes
 
 
 def improvement_bars(improvements: pd.DataFrame) -> Figure:
