@@ -15,7 +15,7 @@ from hyuav.viz.dashboard.index import RunIndex
 from hyuav.viz.dashboard.plain import plain
 from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html import style
-from hyuav.viz.html.html import Page, Section, render
+from hyuav.viz.html.document import Page, Section, render
 from hyuav.viz.html.tables import configuration_tables, html_table
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0),))
@@ -93,7 +93,7 @@ def test_a_page_whose_every_word_is_hostile_has_no_element_of_theirs() -> None:
 
 @pytest.mark.parametrize("name", PAYLOADS)
 def test_a_figure_ends_no_script(name: str) -> None:
-    from hyuav.viz.html.html import _data
+    from hyuav.viz.html.document import _data
 
     figure = go.Figure(layout={"title": {"text": name.encode("utf-8", "replace").decode()}})
     assert "<" not in _data(figure)

@@ -12,7 +12,7 @@ from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evalu
 from hyuav.experiments.experiment import reference_policies
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.data.runs import horizon_directory
-from hyuav.viz.html.html import Page, Section
+from hyuav.viz.html.document import Page, Section
 from hyuav.viz.html.run import run_page
 
 pytest_plugins = "sample_runs"

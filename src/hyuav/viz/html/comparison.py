@@ -14,7 +14,7 @@ from hyuav.experiments.experiment import learned_policies
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.comparison import ReadableComparison, TrainedEntry
 from hyuav.viz.html.comparison_figures import comparison_figures
-from hyuav.viz.html.html import Page, Picture, Section
+from hyuav.viz.html.document import Page, Picture, Section
 from hyuav.viz.html.player import flight_player
 from hyuav.viz.html.run import PLAYER_HEIGHT, config_section, map_section
 from hyuav.viz.html.tables import algorithms_table, cells_table

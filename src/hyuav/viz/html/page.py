@@ -6,7 +6,7 @@ from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.run_directory import REPORT_FILE, require_writable
 from hyuav.viz.data.comparison import is_comparison
 from hyuav.viz.html.comparison import comparison_page
-from hyuav.viz.html.html import write_page
+from hyuav.viz.html.document import write_page
 from hyuav.viz.html.run import run_page
 
 

@@ -25,7 +25,7 @@ from hyuav.viz.data.runs import (
 )
 from hyuav.viz.data.schemes import scheme_label, scheme_place
 from hyuav.viz.html.curves import MAX_POINTS, QUANTITIES, learning_figure
-from hyuav.viz.html.html import Page, Picture, Section
+from hyuav.viz.html.document import Page, Picture, Section
 from hyuav.viz.html.maps import HEIGHT, TITLES, map_figure
 from hyuav.viz.html.player import flight_player
 from hyuav.viz.html.tables import configuration_tables, scheme_table
