@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hostile import CASES, PAYLOADS, TRIED, attempt, file_names, fuzz, texts
 from hyuav import Scenario
 from hyuav.viz.dashboard import draft
-from hyuav.viz.dashboard.index import RunIndex
 from hyuav.viz.dashboard.plain import plain
+from hyuav.viz.data.index import RunIndex
 from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html import style
 from hyuav.viz.html.document import Page, Section, render

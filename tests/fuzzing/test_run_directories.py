@@ -19,9 +19,9 @@ from hyuav.experiments.experiment import learned_policies
 from hyuav.experiments.run_directory import RunDirectory, readable_metrics
 from hyuav.viz.dashboard import curves
 from hyuav.viz.dashboard.flights_page import kept_flights
-from hyuav.viz.dashboard.growing import GrowingMetrics
-from hyuav.viz.dashboard.index import RunIndex
 from hyuav.viz.data.curves import last_results
+from hyuav.viz.data.growing import GrowingMetrics
+from hyuav.viz.data.index import RunIndex
 from hyuav.viz.data.reading import readable_evaluation, readable_flights
 from hyuav.viz.html.curves import learning_figure
 from hyuav.viz.html.page import write_report

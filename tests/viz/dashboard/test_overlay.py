@@ -5,12 +5,12 @@ import pytest
 
 from dashboard_runs import SCENARIO
 from hyuav.physics.slot import SCHEMES
-from hyuav.viz.dashboard.flying import flown
 from hyuav.viz.dashboard.overlay import (
     CLICK_TRACE,
     add_flights,
     explorer_map,
 )
+from hyuav.viz.data.flying import flown
 from hyuav.viz.data.maps import RULE_MODES
 from hyuav.viz.data.schemes import scheme_color
 

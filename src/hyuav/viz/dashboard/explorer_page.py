@@ -16,7 +16,9 @@ from hyuav.physics.slot import SCHEMES
 from hyuav.viz.dashboard import draft as drafts
 from hyuav.viz.dashboard.draft_widgets import editor, place
 from hyuav.viz.dashboard.flights_page import player
-from hyuav.viz.dashboard.flying import (
+from hyuav.viz.dashboard.overlay import QUANTITIES, add_flights, explorer_map
+from hyuav.viz.dashboard.plain import plain, refusals
+from hyuav.viz.data.flying import (
     COARSE_DRAWS,
     EPISODES,
     FINE_DRAWS,
@@ -26,9 +28,7 @@ from hyuav.viz.dashboard.flying import (
     learner_label,
     resolution,
 )
-from hyuav.viz.dashboard.index import RunIndex
-from hyuav.viz.dashboard.overlay import QUANTITIES, add_flights, explorer_map
-from hyuav.viz.dashboard.plain import plain, refusals
+from hyuav.viz.data.index import RunIndex
 from hyuav.viz.data.schemes import scheme_label
 
 KEPT = (

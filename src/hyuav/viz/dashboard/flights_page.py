@@ -10,9 +10,9 @@ import streamlit as st
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import FLIGHTS_FILE
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.dashboard.flying import checkpoint_of, flown_by, learner_label
-from hyuav.viz.dashboard.index import RunIndex, Stamp
 from hyuav.viz.dashboard.plain import plain, refusals
+from hyuav.viz.data.flying import checkpoint_of, flown_by, learner_label
+from hyuav.viz.data.index import RunIndex, Stamp
 from hyuav.viz.data.reading import read_flights
 from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html.player import flight_player

@@ -10,10 +10,10 @@ import streamlit as st
 
 from hyuav._support.errors import InputError
 from hyuav.viz.dashboard.curves import X_AXES, Choice, comparison
-from hyuav.viz.dashboard.index import MOST_DRAWN, STATES, RunEntry, RunIndex
 from hyuav.viz.dashboard.plain import plain, refusals
 from hyuav.viz.data.configuration import differences
 from hyuav.viz.data.curves import last_results, quantities
+from hyuav.viz.data.index import MOST_DRAWN, STATES, RunEntry, RunIndex
 
 KEPT = (
     *("search", "scenarios", "algorithms", "schemes", "states"),

@@ -15,11 +15,8 @@ from hyuav.experiments.evaluation import (
     FLIGHTS_FILE,
     OPTIMA,
     Evaluation,
-    EvaluationParameters,
-    Policy,
-    evaluate,
 )
-from hyuav.experiments.experiment import LEARNED, LEARNED_AS_IN_PAPER, LINEAR, learned_policies
+from hyuav.experiments.experiment import LEARNED, LEARNED_AS_IN_PAPER
 from hyuav.experiments.run_directory import RunDirectory, named_scenario, readable_metrics
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import learning_curves, learning_table
@@ -35,9 +32,6 @@ from hyuav.viz.data.schemes import COMPARED
 
 AS_IN_PAPER, HORIZONS = "as_in_paper", "horizons"
 """Directories within a main job's run: the paper's own algorithm, and other horizons."""
-
-QUICK = EvaluationParameters(episodes=100, flights=1)
-"""How runs are flown that nobody has evaluated."""
 
 
 def horizon_directory(run: RunDirectory, num_slots: int) -> Path:
@@ -215,30 +209,3 @@ def all_metrics(directory: Path) -> pd.DataFrame:
         for run, names in ((own, LEARNED), (paper, LEARNED_AS_IN_PAPER))
     ]
     return pd.concat([table for table in rows if len(table)] or rows[:1], ignore_index=True)
-
-
-def fly_now(run: RunDirectory, name: str) -> tuple[Scenario, Evaluation]:
-    """Fly the best weights and the straight flights through a few episodes.
-
-    Args:
-        run: whose weights they are.
-        name: of its scenario.
-
-    Returns:
-        the scenario, over a horizon for which there are learners, and what came of it.
-
-    Raises:
-        InputError: the weights cannot be read, or do not fit.
-    """
-    configuration = run.configuration()
-    scenario = configuration.scenario
-    horizons = [learner.num_slots or scenario.num_slots for learner in configuration.learners]
-    if scenario.num_slots not in horizons:
-        scenario = dataclasses.replace(scenario, num_slots=max(horizons))
-    policies = learned_policies([run], scenario)
-    for scheme, straight in LINEAR.items():
-        try:
-            policies[scheme] = [Policy(straight(scenario))]
-        except InputError:  # too fast for the horizon
-            continue
-    return scenario, evaluate(scenario, name, policies, QUICK)

@@ -9,10 +9,10 @@ from hyuav._support.errors import InputError
 from hyuav._support.formatting import percent
 from hyuav.experiments.comparison.statistics import summarize_algorithms, summarize_cells
 from hyuav.experiments.comparison.tables import label, stopped
-from hyuav.experiments.evaluation import LABELS, EvaluationParameters, evaluate
-from hyuav.experiments.experiment import learned_policies
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.comparison import ReadableComparison, TrainedEntry
+from hyuav.viz.data.flying import fly_first_learner
+from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html.comparison_figures import comparison_figures
 from hyuav.viz.html.document import Page, Picture, Section
 from hyuav.viz.html.player import flight_player
@@ -21,8 +21,6 @@ from hyuav.viz.html.tables import algorithms_table, cells_table
 
 MAX_FLIGHTS, MAX_MAPS = 8, 2
 """Of a report: of the longest horizon, and of the presets before random layouts."""
-
-_FEW = EvaluationParameters(episodes=2, flights=1)
 
 
 def comparison_page(directory: Path) -> Page:
@@ -71,13 +69,11 @@ def _flights(runs: Sequence[TrainedEntry]) -> Section:
     for entry, run, configuration in runs:
         scenario, name = configuration.scenario, configuration.scenario_name
         try:
-            policies = learned_policies([run], scenario)
-            scheme = next(scheme for scheme in LABELS if scheme in policies)
-            evaluation = evaluate(scenario, name, {scheme: policies[scheme]}, _FEW)
+            scheme, evaluation = fly_first_learner(run, configuration)
         except InputError as error:
             notes.append(f"{run.path.name} is left out: {error}")
             continue
-        text = f"{label(entry)}, {name}, T = {scenario.num_slots}, {LABELS[scheme]}"
+        text = f"{label(entry)}, {name}, T = {scenario.num_slots}, {scheme_label(scheme)}"
         figures[text] = flight_player(scenario, evaluation.flights, scheme)
     if not figures:
         return Section("Flights", notes or ["There are no weights to fly by yet."])

@@ -12,14 +12,13 @@ from hyuav.experiments.experiment import LEARNED_AS_IN_PAPER
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import SMOOTHING
+from hyuav.viz.data.flying import QUICK, fly_now
 from hyuav.viz.data.maps import helper_map
 from hyuav.viz.data.reading import optima_of, readable_config
 from hyuav.viz.data.runs import (
-    QUICK,
     all_metrics,
     evaluated_scenario,
     evaluations,
-    fly_now,
     own_first,
     readable_scenario,
 )

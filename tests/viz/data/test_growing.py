@@ -5,7 +5,7 @@ import pytest
 from hyuav._support.errors import InputError
 from hyuav.experiments.metrics_file import MetricsFile
 from hyuav.experiments.run_directory import METRIC_COLUMNS
-from hyuav.viz.dashboard.growing import GrowingMetrics
+from hyuav.viz.data.growing import GrowingMetrics
 
 HEADER = ",".join(METRIC_COLUMNS) + "\n"
 

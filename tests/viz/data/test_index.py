@@ -8,7 +8,7 @@ import pytest
 from dashboard_runs import WriteRun, metrics_row
 from hyuav._support.errors import InputError
 from hyuav.experiments.metrics import parse_rows
-from hyuav.viz.dashboard.index import MOST_DRAWN, RUNNING_SECONDS, RunIndex
+from hyuav.viz.data.index import MOST_DRAWN, RUNNING_SECONDS, RunIndex
 
 
 def test_a_run_is_listed_with_what_it_is_and_how_far_it_has_come(
@@ -66,7 +66,7 @@ def test_as_many_runs_as_can_be_drawn_are_parsed_once(
         parsed.append(lines)
         return parse_rows(lines, columns)
 
-    monkeypatch.setattr("hyuav.viz.dashboard.growing.parse_rows", parse)
+    monkeypatch.setattr("hyuav.viz.data.growing.parse_rows", parse)
     index = RunIndex(tmp_path / "runs")
     first = [index.metrics(name) for name in names]
     assert len(parsed) == MOST_DRAWN
@@ -179,8 +179,8 @@ def test_no_symbolic_link_leads_out_of_the_directory(write: WriteRun, tmp_path: 
             read()
 
 
-def test_the_optima_of_an_evaluation_are_read(trained: Path) -> None:
-    optima = RunIndex(trained).optima("tiny")
+def test_the_optima_of_an_evaluation_are_read(trained_runs: Path) -> None:
+    optima = RunIndex(trained_runs).optima("tiny")
     assert set(optima) == {"hybrid", "relay", "jamming"}
     assert optima["hybrid"] >= optima["relay"] > 0
 

@@ -14,7 +14,7 @@ from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.experiments.metrics import parse_rows
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.viz.dashboard.growing import GrowingMetrics, require_columns
+from hyuav.viz.data.growing import GrowingMetrics, require_columns
 from hyuav.viz.data.reading import optima_of, read_evaluation, readable_config
 
 RUNNING_SECONDS = 120.0
