@@ -17,7 +17,7 @@ def test_only_entries_that_differ_are_told_and_long_ones_are_cut() -> None:
     table = differences({"one": shared, "other": other})
     assert table.index.tolist() == ["training.num_episodes"]
     assert table.loc["training.num_episodes", "one"] == "3"
-    assert len(table.loc["training.num_episodes", "other"]) == 80
+    assert len(str(table.loc["training.num_episodes", "other"])) == 80
 
 
 def test_parameters_of_the_scenario_have_their_symbol_and_unit() -> None:
