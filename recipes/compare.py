@@ -28,7 +28,7 @@ from hyuav.experiments.configuration import Config, recipe, same_call, section, 
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.experiments.tracking import LoggerParameters, log_comparison
 from hyuav.learning.training import TrainingParameters
-from hyuav.viz.html.page import write_comparison_report
+from hyuav.viz.html.page import write_report
 from hyuav.viz.paper.comparison import draw
 
 
@@ -63,7 +63,7 @@ def compare(config: Config, directory: Path) -> None:
         print_tables(summary, options.threshold, console)
         draw(summary, options, directory / "figures")
         logger = LoggerParameters.from_dict(config["logger"])
-        report = write_comparison_report(directory)
+        report = write_report(directory)
         log_comparison(directory, summary.tables, config, logger, console)
         print_line(f"its report: {report.name}", console)
     print_line(f"comparison: {directory}", console)

@@ -39,8 +39,8 @@ from hyuav.experiments.evaluation_table import print_results
 from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunDirectory, require_writable
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
-from hyuav.viz.html.page import write_run_report
-from hyuav.viz.paper import save_flight_map
+from hyuav.viz.html.page import write_report
+from hyuav.viz.paper.flights import save_flight_map
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def main(config: Config, _: Path) -> None:
     evaluation.save(output)
     save_flight_map(scenario, evaluation.flights, output / "figures")
     print_results(evaluation, console)
-    report = write_run_report(output)
+    report = write_report(output)
     log_evaluation(output, evaluation, runs, logger, console)
     print_line(f"evaluation: {output}", console)
     print_line(f"its report: {report.name}", console)

@@ -51,8 +51,9 @@ from hyuav.learning.training import TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.physics.slot import SCHEMES
 from hyuav.references.optimum import require_resolution
-from hyuav.viz.html.page import write_run_report
-from hyuav.viz.paper.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
+from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
+from hyuav.viz.html.page import write_report
+from hyuav.viz.paper.gallery import FIGURES, draw
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ def reproduce(config: Config, directory: Path) -> None:
     draw(run, options.figures, console)
     paths = [run.path, *(run.path / own.scenario_name for own in further)]
     with make_progress(console, "reports") as progress:
-        reports = [write_run_report(path) for path in progress.track(paths)]
+        reports = [write_report(path) for path in progress.track(paths)]
     for path, evaluation, trained in evaluated:
         work.log(path, evaluation, trained)
     for path, evaluation, _ in evaluated:

@@ -44,7 +44,7 @@ from hyuav.experiments.train import resume, train_or_resume
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.slot import SCHEMES
-from hyuav.viz.html.page import write_run_report
+from hyuav.viz.html.page import write_report
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def tell(run: RunDirectory, console: Console) -> None:
     returns = ", ".join(f"{value:.2f}" for value in best)
     print_line(f"best noise-free accumulated reward (bps/Hz): {returns}", console)
     print_line(f"run: {run.path}", console)
-    print_line(f"its report: {write_run_report(run.path).name}", console)
+    print_line(f"its report: {write_report(run.path).name}", console)
 
 
 if __name__ == "__main__":

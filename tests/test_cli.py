@@ -12,7 +12,8 @@ import pytest
 
 import hyuav
 from hyuav import cli
-from hyuav.experiments.run_directory import RunDirectory, readable_metrics
+from hyuav.experiments.metrics import readable_metrics
+from hyuav.experiments.run_directory import RunDirectory
 from recipe_calls import TINY, TINY_COMPARISON
 
 RECIPES = Path(__file__).parents[1] / "recipes"

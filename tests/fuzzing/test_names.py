@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from hostile import CASES, PAYLOADS, TRIED, attempt, file_names, fuzz, texts
 from hyuav import Scenario
 from hyuav.viz.dashboard import draft
-from hyuav.viz.dashboard.index import RunIndex
 from hyuav.viz.dashboard.plain import plain
-from hyuav.viz.html.html import Page, Section, render
-from hyuav.viz.html.style import scheme_label
+from hyuav.viz.data.index import RunIndex
+from hyuav.viz.data.schemes import scheme_label
+from hyuav.viz.html import style
+from hyuav.viz.html.document import Page, Section, render
 from hyuav.viz.html.tables import configuration_tables, html_table
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0),))
@@ -44,8 +45,7 @@ def show(name: str) -> None:
     for tag, attributes in Tags(str(content)).found:
         assert tag in OWN_TAGS
         assert not any(attribute.startswith("on") for attribute in attributes)
-    label = scheme_label(name)
-    assert "<" not in label
+    assert "<" not in style.plain(scheme_label(name))
     assert "<" not in plain(name).replace("\\<", "")
     assert "\n" not in plain(name)
 
@@ -93,7 +93,7 @@ def test_a_page_whose_every_word_is_hostile_has_no_element_of_theirs() -> None:
 
 @pytest.mark.parametrize("name", PAYLOADS)
 def test_a_figure_ends_no_script(name: str) -> None:
-    from hyuav.viz.html.html import _data
+    from hyuav.viz.html.document import _data
 
     figure = go.Figure(layout={"title": {"text": name.encode("utf-8", "replace").decode()}})
     assert "<" not in _data(figure)

@@ -18,9 +18,10 @@ from hyuav import InputError, Scenario
 from hyuav.experiments.metrics import GrowingMetrics, readable_metrics
 from hyuav.experiments.policies import learned_policies
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.viz.dashboard import curves, tables
-from hyuav.viz.dashboard.flights_page import read_flights
-from hyuav.viz.dashboard.index import RunIndex
+from hyuav.viz.dashboard import curves
+from hyuav.viz.dashboard.flights_page import kept_flights
+from hyuav.viz.data.curves import last_results
+from hyuav.viz.data.index import RunIndex
 from hyuav.viz.data.reading import readable_evaluation, readable_flights
 from hyuav.viz.html.curves import learning_figure
 from hyuav.viz.html.page import write_report
@@ -49,7 +50,7 @@ def draw_metrics(path: Path) -> None:
     index.entries()
     metrics = {"run": GrowingMetrics(path).read()}
     curves.comparison(metrics, {}, curves.Choice())
-    tables.outcomes(metrics, curves.Choice())
+    last_results(metrics, curves.Choice.y)
 
 
 cells = (texts | numbers.map(str) | st.sampled_from(["hybrid", "relay", "1", "2", "10"])).map(
@@ -142,10 +143,10 @@ def _has_bytes(value: Any) -> bool:
 def show_flights(path: Path, scenario: Scenario) -> None:
     flights = readable_flights(path.parent)
     state = path.stat()
-    read_flights.cache_clear()
+    kept_flights.cache_clear()
     if flights is not None:
         flight_player(scenario, flights, flights["scheme"].iloc[0], flights["episode"].iloc[0])
-    read_flights(path, (state.st_mtime_ns, state.st_size))
+    kept_flights(path.parent, (state.st_mtime_ns, state.st_size))
 
 
 @pytest.mark.slow

@@ -38,6 +38,9 @@ LEGITIMATE_COLOR, EAVESDROPPER_COLOR = "#5A5A5A", "#222222"  # the palette is fo
 HELPER_COLOR = OKABE_ITO["bluish green"]
 UE_COLOR = OKABE_ITO["black"]
 
+LEGITIMATE_LABEL, EAVESDROPPER_LABEL = "legitimate UAV (L)", "eavesdropper (E)"
+HELPER_LABEL = "helper UAV (H)"
+
 _FRAME_INCHES, _FRAME_DPI = (7.6, 5.2), 100  # even numbers of pixels, as video encoders want
 _FRAME_MAP, _FRAME_LEGEND = (0.13, 0.11, 0.55, 0.55 * 7.6 / 5.2), (0.69, 0.935)
 
@@ -64,8 +67,8 @@ def draw_scenario(axes: Axes, scenario: Scenario, covered: ArrayLike | None = No
     axes.set_axisbelow(True)
     axes.grid(color="0.92", linewidth=_width(0.5))
     draw_coverage(axes, scenario.legitimate_position, scenario.coverage_radius, LEGITIMATE_COLOR)
-    _draw_uav(axes, scenario.legitimate_position, "legitimate UAV (L)", _LEGITIMATE)
-    _draw_uav(axes, scenario.eavesdropper_position, "eavesdropper (E)", _EAVESDROPPER)
+    _draw_uav(axes, scenario.legitimate_position, LEGITIMATE_LABEL, _LEGITIMATE)
+    _draw_uav(axes, scenario.eavesdropper_position, EAVESDROPPER_LABEL, _EAVESDROPPER)
     if covered is None:
         _draw_ues(axes, np.asarray(scenario.ue_positions), UE_COLOR, "UE")
         return
@@ -105,7 +108,7 @@ def draw_flight(
         raise InputError(rejection("positions", path.shape, "shape (T + 1, 2)"))
     if relays.shape != (len(path) - 1,):
         raise InputError(rejection("modes", relays.shape, f"shape {(len(path) - 1,)}"))
-    for relay, first, last in _runs_of_one_mode(relays):
+    for relay, first, last in runs_of_one_mode(relays):
         axes.plot(*path[first : last + 1].T, **_slot_style(color, relay=relay) | {"marker": ""})
         axes.plot(*path[first + 1 : last + 1].T, **_slot_style(color, relay=relay) | _DOTS_ONLY)
     edge = {"markeredgecolor": "white", "markeredgewidth": _width(0.5)}
@@ -144,7 +147,7 @@ def render_frame(scenario: Scenario, positions: ArrayLike, modes: ArrayLike) -> 
     draw_scenario(axes, scenario, _covered(scenario, helper, relay=bool(relays[-1])))
     draw_coverage(axes, helper, scenario.coverage_radius, HELPER_COLOR)
     draw_flight(axes, path, relays[1:], HELPER_COLOR)
-    _draw_uav(axes, helper, "helper UAV (H)", _HELPER)
+    _draw_uav(axes, helper, HELPER_LABEL, _HELPER)
     axes.set_title(f"slot {slot} of {scenario.num_slots}, {'relay' if relays[-1] else 'jamming'}")
     nodes, _ = axes.get_legend_handles_labels()
     figure.legend(
@@ -261,7 +264,7 @@ def _slot_style(color: str, *, relay: bool) -> dict[str, Any]:
     }
 
 
-def _runs_of_one_mode(relays: NDArray[np.bool_]) -> Iterator[tuple[bool, int, int]]:
+def runs_of_one_mode(relays: NDArray[np.bool_]) -> Iterator[tuple[bool, int, int]]:
     """Mode, first slot and end of each longest run, so that dashes go on over the slots."""
     changes = np.flatnonzero(relays[1:] != relays[:-1]) + 1
     bounds = [0, *changes.tolist(), len(relays)] if len(relays) else []

@@ -1,8 +1,12 @@
 """What an evaluation found, as a table for the terminal."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from rich.console import Console
 
 from hyuav._support.errors import harmless
+from hyuav._support.formatting import interval, percent
 from hyuav._support.terminal import print_table, results_table
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.schemes import LABELS
@@ -26,16 +30,7 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         "off\nmap",
     )
     for scheme, result in summary["schemes"].items():
-        rate = result["secrecy_sum_rate"]
-        table.add_row(
-            LABELS[scheme],
-            "{:.2f} [{:.2f}, {:.2f}]".format(rate["mean"], *rate["ci95"]),
-            _percent(result.get("fraction_of_optimum")),
-            _percent(result.get("fraction_of_hybrid_optimum")),
-            _percent(result["relay_share"]),
-            _percent(result["offloading_share"]),
-            f"{result['off_map']:.1f}",
-        )
+        table.add_row(LABELS[scheme], *flight_cells(result))
     print_table(table, console)
     for scheme, result in summary["schemes"].items():
         if result["budget_violations"] > 0:
@@ -43,5 +38,22 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
             console.print(f"{LABELS[scheme]}: {count} energy budgets exceeded per episode")
 
 
-def _percent(fraction: float | None) -> str:
-    return "-" if fraction is None else f"{100 * fraction:.1f} %"
+def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
+    """How a scheme flew, as text.
+
+    Args:
+        result: of the scheme, in the summary.
+
+    Returns:
+        the secrecy sum-rate with its interval, the fractions of the scheme's own and of the hybrid
+        optimum, the shares of relay slots and of UEs offloading, and the slots off the map.
+    """
+    rate = result["secrecy_sum_rate"]
+    return (
+        interval(rate["mean"], *rate["ci95"]),
+        percent(result.get("fraction_of_optimum")),
+        percent(result.get("fraction_of_hybrid_optimum")),
+        percent(result["relay_share"]),
+        percent(result["offloading_share"]),
+        f"{result['off_map']:.1f}",
+    )

@@ -22,7 +22,7 @@ WIDTHS = pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phon
 
 
 @pytest.fixture(scope="module")
-def runs(trained: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def runs(trained_runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Runs of all kinds, the trained one as the newest."""
     root = tmp_path_factory.mktemp("served") / "runs"
     write_run(root, "long", LONG, num_episodes=LONG)
@@ -30,7 +30,7 @@ def runs(trained: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         file.write("41,410,0,hyb")
     (write_run(root, "empty", 1) / "metrics.csv").write_bytes(b"")
     write_run(root, "<img src=x onerror=alert(1)>", 30, scenario="![x](http://example.org/x)")
-    shutil.copytree(trained / "tiny", root / "tiny", copy_function=shutil.copy)
+    shutil.copytree(trained_runs / "tiny", root / "tiny", copy_function=shutil.copy)
     return root
 
 

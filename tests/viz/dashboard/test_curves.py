@@ -3,9 +3,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from hyuav.viz.dashboard.curves import MOST_POINTS, Choice, axes_of, comparison, thinned
-from hyuav.viz.html.style import scheme_dash
-from hyuav.viz.paper import COLORS
+from hyuav.viz.dashboard.curves import MOST_POINTS, Choice, comparison
+from hyuav.viz.data.schemes import COLORS, scheme_line
+from hyuav.viz.html.style import DASHES
 
 
 def metrics(rewards: np.ndarray, scheme: str = "hybrid", num_slots: int = 10) -> pd.DataFrame:
@@ -75,7 +75,7 @@ def test_a_single_runs_schemes_have_the_lines_of_every_figure() -> None:
     rules = ("hybrid", "relay", "jamming")
     rows = pd.concat([metrics(ramp(3, 1), rule) for rule in rules])
     dashes = [line.line.dash for line in comparison({"run": rows}, {}, PLAIN).data]
-    assert dashes == [scheme_dash(scheme) for scheme in ("proposed", "re_ot", "ja_ot")]
+    assert dashes == [DASHES[scheme_line(scheme)] for scheme in ("proposed", "re_ot", "ja_ot")]
     both = comparison({"one": rows, "two": rows}, {}, Choice(smoothing=1, color_by="run")).data
     assert len({line.line.dash for line in both[:3]}) == 3
     assert "dot" not in {line.line.dash for line in both}  # as only optima are
@@ -106,19 +106,10 @@ def test_a_hundred_thousand_points_leave_their_extremes_in_the_figure() -> None:
     assert (line.x[0], line.x[-1]) == (1.0, 100_000.0)
 
 
-def test_what_was_not_measured_is_left_out_of_a_line() -> None:
-    x, y = thinned(np.arange(4.0), np.array([np.nan, 1.0, np.nan, 2.0]))
-    assert (x.tolist(), y.tolist()) == ([1.0, 3.0], [1.0, 2.0])
-
-
 def test_a_runs_name_stays_text() -> None:
     both = {"<b>one</b>": metrics(ramp(3, 2)), "two": metrics(ramp(3, 2))}
     names = [line.name for line in comparison(both, {}, PLAIN).data if line.name]
     assert names[0] == "Proposed, &lt;b&gt;one&lt;/b&gt; (mean of 2)"
-
-
-def test_the_losses_come_behind_the_returns() -> None:
-    assert list(axes_of({"run": metrics(ramp(2, 1))})) == ["accumulated_reward", "loss_critic"]
 
 
 def test_a_run_without_rows_has_no_lines() -> None:

@@ -15,21 +15,21 @@ from hyuav.viz.dashboard.draft import load, save
 
 def _runs(root: str) -> None:
     from hyuav.viz.dashboard import runs_page
-    from hyuav.viz.dashboard.index import RunIndex
+    from hyuav.viz.data.index import RunIndex
 
     runs_page.show(RunIndex(root))
 
 
 def _flights(root: str) -> None:
     from hyuav.viz.dashboard import flights_page
-    from hyuav.viz.dashboard.index import RunIndex
+    from hyuav.viz.data.index import RunIndex
 
     flights_page.show(RunIndex(root))
 
 
 def _explorer(root: str) -> None:
     from hyuav.viz.dashboard import explorer_page
-    from hyuav.viz.dashboard.index import RunIndex
+    from hyuav.viz.data.index import RunIndex
 
     explorer_page.show(RunIndex(root))
 
@@ -38,7 +38,7 @@ def _followed(root: str) -> None:
     import streamlit as st
 
     from hyuav.viz.dashboard import runs_page
-    from hyuav.viz.dashboard.index import RunIndex
+    from hyuav.viz.data.index import RunIndex
 
     if "index" not in st.session_state:
         st.session_state["index"] = RunIndex(root)
@@ -72,8 +72,10 @@ def test_every_page_opens_without_runs(
 
 
 @pytest.mark.parametrize("page", PAGES.values(), ids=PAGES.keys())
-def test_every_page_opens_with_a_trained_run(trained: Path, page: Callable[[str], None]) -> None:
-    shown = opened(page, trained)
+def test_every_page_opens_with_a_trained_run(
+    trained_runs: Path, page: Callable[[str], None]
+) -> None:
+    shown = opened(page, trained_runs)
     assert errors(shown) == []
     assert len(shown.get("plotly_chart")) >= 1
 
@@ -183,8 +185,8 @@ def test_no_name_becomes_markup(
             assert "<img" not in text
 
 
-def test_the_flights_of_an_evaluation_and_of_a_checkpoint_are_played(trained: Path) -> None:
-    page = opened(_flights, trained)
+def test_the_flights_of_an_evaluation_and_of_a_checkpoint_are_played(trained_runs: Path) -> None:
+    page = opened(_flights, trained_runs)
     assert page.selectbox(key="flown_source").value == "kept by its evaluation"
     page.selectbox(key="flown_scheme").set_value("re_optimum").run()
     page.selectbox(key="flown_episode").set_value(1).run()
@@ -246,8 +248,10 @@ def test_a_node_is_moved_by_its_coordinates(tmp_path: Path) -> None:
     assert line.startswith("eavesdropper_position = (-70.0, 700.0): expected a position on the map")
 
 
-def test_a_checkpoint_flies_in_the_changed_scenario_until_it_does_not_fit(trained: Path) -> None:
-    page = opened(_explorer, trained)
+def test_a_checkpoint_flies_in_the_changed_scenario_until_it_does_not_fit(
+    trained_runs: Path,
+) -> None:
+    page = opened(_explorer, trained_runs)
     page.selectbox(key="pilot").set_value("tiny").run()
     assert [own.label for own in page.metric] == ["Optimum", "Proposed"]
     assert "of the optimum" in page.metric[1].delta

@@ -2,20 +2,42 @@ import dataclasses
 
 import numpy as np
 import pytest
+import torch
 
+from dashboard_runs import SCENARIO
 from hyuav import Scenario
-from hyuav.viz.data.maps import sum_rates_over_map
+from hyuav.physics.slot import SCHEMES, SecureOffloadingSystem
+from hyuav.viz.data.maps import RULE_MODES, helper_map
 
 
 def test_rates_stand_at_the_position_of_their_row_and_column() -> None:
     scenario = dataclasses.replace(Scenario.preset("two_clusters"), fading=False)
-    rates = sum_rates_over_map(scenario, 1.0)
+    rates = helper_map(scenario, 1.0)
     row, column = np.searchsorted(rates.axis, (6.0, -49.0))  # y, x
     assert rates.relay[row, column] == pytest.approx(2.391039, abs=1e-6)
-    assert rates.of("jamming")[-21, -21] == pytest.approx(2.714112, abs=1e-6)
+    assert rates.rates("jamming")[-21, -21] == pytest.approx(2.714112, abs=1e-6)
 
 
 def test_a_full_server_is_mapped_with_mean_tasks() -> None:
     scenario = dataclasses.replace(Scenario.preset("two_clusters"), edge_energy_budget=5.0)
-    free = sum_rates_over_map(Scenario.preset("two_clusters"), 20.0)
-    assert sum_rates_over_map(scenario, 20.0).better.sum() < free.better.sum()
+    free = helper_map(Scenario.preset("two_clusters"), 20.0)
+    assert helper_map(scenario, 20.0).better.sum() < free.better.sum()
+
+
+@pytest.mark.parametrize("crowded", [False, True])
+def test_the_counts_are_of_the_ues_that_offload_there(crowded: bool) -> None:
+    budget = 1.0 if crowded else SCENARIO.edge_energy_budget
+    scenario = dataclasses.replace(SCENARIO, edge_energy_budget=budget)
+    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
+    for x, y in ((-20.0, -20.0), (80.0, 60.0), (-40.0, 20.0), (0.0, 0.0)):
+        at = int((y + 100) / 20), int((x + 100) / 20)
+        distances = system.distances(torch.tensor([x, y], dtype=torch.float64))
+        gains = system.channel_gains(distances, None)
+        tasks = system.mean_tasks(()) if system.edge_can_saturate else None
+        relay = system.relay_outcome(distances, gains, tasks)
+        jamming = system.jamming_outcome(gains, tasks)
+        better = relay if relay.sum_rate > jamming.sum_rate else jamming
+        for rule, outcome in zip(SCHEMES, (better, relay, jamming), strict=True):
+            expected = int(outcome.offloading.sum())
+            counts = helper_map(scenario, 20.0).offloading(RULE_MODES[rule])
+            assert counts[at] == expected

@@ -4,8 +4,16 @@ from typing import Any
 
 import pytest
 
+from hyuav._support.errors import InputError
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.viz.data.reading import readable_config, readable_evaluation, readable_flights
+from hyuav.viz.data.reading import (
+    optima_of,
+    read_evaluation,
+    read_flights,
+    readable_config,
+    readable_evaluation,
+    readable_flights,
+)
 
 pytest_plugins = "sample_runs"
 
@@ -46,3 +54,24 @@ def test_a_file_cut_off_is_nothing(share: float, tmp_path: Path, evaluated: RunD
 def test_another_programs_evaluation_is_nothing(content: Any, tmp_path: Path) -> None:
     (tmp_path / "evaluation.json").write_text(json.dumps(content))
     assert readable_evaluation(tmp_path) is None
+
+
+def test_what_is_missing_or_lacks_a_column_is_refused_in_a_line(
+    tmp_path: Path, evaluated: RunDirectory
+) -> None:
+    with pytest.raises(InputError, match=r"^there is no evaluation\.json in [^\n]+$"):
+        read_evaluation(tmp_path)
+    flights = read_flights(evaluated.path).drop(columns="relay")
+    flights.to_parquet(tmp_path / "flights.parquet")
+    with pytest.raises(InputError, match=r"flights of an evaluation in Parquet \(with relay\)$"):
+        read_flights(tmp_path)
+
+
+def test_each_mode_rule_has_its_optimum(evaluated: RunDirectory) -> None:
+    content = read_evaluation(evaluated.path)
+    best = {name: own["secrecy_sum_rate"]["mean"] for name, own in content["schemes"].items()}
+    assert optima_of(content) == {
+        "hybrid": best["optimum"],
+        "jamming": best["ja_optimum"],
+        "relay": best["re_optimum"],
+    }

@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 
 from hyuav.experiments.comparison.statistics import summarize_cells
-from hyuav.viz.html.curves import MAX_POINTS, comparison_figures, learning_figure
-from hyuav.viz.paper import COLORS
-from hyuav.viz.paper.curves import learning_table
-from hyuav.viz.paper.style import LINES
+from hyuav.viz.data.curves import learning_curves, learning_table
+from hyuav.viz.data.schemes import COLORS, scheme_line
+from hyuav.viz.html.comparison_figures import comparison_figures
+from hyuav.viz.html.curves import MAX_POINTS, learning_figure
 
 
 def _metrics(episodes: int, schemes: dict[str, int], num_slots: int = 20) -> pd.DataFrame:
@@ -53,7 +53,9 @@ def test_what_jams_is_dashed_and_what_the_papers_algorithm_learns_thinner_and_pa
     for name in ("Proposed", "Re-OT", "Ja-OT"):
         own, paper = drawn[name], drawn[f"Paper {name}"]
         assert own.line.dash == paper.line.dash
-        assert (own.line.dash == "solid") == (LINES[name.lower().replace("-", "_")] == "solid")
+        assert (own.line.dash == "solid") == (
+            scheme_line(name.lower().replace("-", "_")) == "solid"
+        )
         assert paper.line.width < own.line.width
         assert paper.opacity < (own.opacity or 1.0)
     assert drawn["its optimum"].line.dash == figure.layout.shapes[0].line.dash
@@ -65,10 +67,11 @@ def test_the_line_and_its_band_are_those_of_the_printed_figure() -> None:
     rewards = metrics.pivot_table("accumulated_reward", "episode", "learner")
     rewards[7] += 1000.0
     metrics = rewards.reset_index().melt("episode", value_name="accumulated_reward")
-    figure = learning_figure(metrics.assign(scheme="hybrid", num_slots=20))
+    metrics = metrics.assign(scheme="hybrid", num_slots=20)
+    figure = learning_figure(metrics)
     (band,) = (trace for trace in figure.data if trace.fill == "toself")
     (line,) = (trace for trace in figure.data if trace.name == "Proposed")
-    printed = learning_table({"proposed": rewards}, {})
+    printed = learning_table(learning_curves(metrics), {})
     np.testing.assert_allclose(line.y, printed["iqm"], atol=1e-3)
     np.testing.assert_allclose(band.y[:40], printed["low"], atol=1e-3)
     np.testing.assert_allclose(band.y[40:][::-1], printed["high"], atol=1e-3)
@@ -145,7 +148,7 @@ def results() -> pd.DataFrame:
 def test_a_comparison_shows_every_cell_and_every_algorithm(results: pd.DataFrame) -> None:
     cells = summarize_cells(results, 0.97)
     curves = pd.concat([results.assign(episode=episode) for episode in (5, 10)])
-    several = list(comparison_figures(results, curves, cells, 0.97).values())
+    several = [figure for *_, figure in comparison_figures(results, curves, cells, 0.97)]
     for figure in several:
         assert {"DDPG", "SAC"} <= {trace.name for trace in figure.data}
     shown = [x for trace in several[0].data if trace.name in ("DDPG", "SAC") for x in trace.x]

@@ -9,7 +9,7 @@ from plotly.offline import get_plotlyjs
 
 from hyuav import InputError
 from hyuav.experiments.run_directory import REPORT_FILE, RunDirectory
-from hyuav.viz.html.page import write_comparison_report, write_report, write_run_report
+from hyuav.viz.html.page import write_report
 
 pytest_plugins = "sample_runs"
 
@@ -44,14 +44,14 @@ def _outline(path: Path) -> _Outline:
 
 def test_a_report_is_one_file_that_asks_for_no_other(trained: RunDirectory, copied: Copy) -> None:
     run = copied(trained)
-    path = write_run_report(run.path)
+    path = write_report(run.path)
     assert path == run.path / REPORT_FILE
     assert _outline(path).addresses == ["data:,"]
     assert path.read_text(encoding="utf-8").count(get_plotlyjs()[:200]) == 1
 
 
 def test_the_contents_lead_to_every_section(evaluated: RunDirectory, copied: Copy) -> None:
-    outline = _outline(write_run_report(copied(evaluated).path))
+    outline = _outline(write_report(copied(evaluated).path))
     assert outline.headings[0] == "h1"
     assert outline.headings[1:] == ["h2"] * len(outline.links)
     assert {link.removeprefix("#") for link in outline.links} <= outline.anchors
@@ -84,9 +84,6 @@ def test_a_run_with_broken_weights_has_a_report_that_says_so(
     assert "The weights cannot be flown" in write_report(run.path).read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("write", [write_run_report, write_comparison_report, write_report])
-def test_a_directory_that_is_not_there_is_refused(
-    write: Callable[[Path], Path], tmp_path: Path
-) -> None:
+def test_a_directory_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"run = .*: expected an existing directory"):
-        write(tmp_path / "none")
+        write_report(tmp_path / "none")

@@ -17,7 +17,7 @@ from hyuav.experiments.metrics import METRIC_COLUMNS
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS
 from hyuav.viz.data.reading import readable_flights
-from hyuav.viz.html.page import write_comparison_report, write_report
+from hyuav.viz.html.page import write_report
 from recipe_calls import TINY_COMPARISON, Call
 
 pytest_plugins = "sample_runs"
@@ -219,7 +219,7 @@ def test_an_ablation_with_many_pieces_is_legible(tmp_path: Path, screen: tuple[i
     unknown = {"episodes_to_threshold": None, "seconds_to_threshold": None, "seconds": 1.0}
     pd.DataFrame(rows).assign(**unknown).to_parquet(tmp_path / RESULTS_FILE)
     pd.DataFrame(rows).to_parquet(tmp_path / CURVES_FILE)
-    with opened(write_comparison_report(tmp_path), screen) as page:
+    with opened(write_report(tmp_path), screen) as page:
         misplaced = page.evaluate(MISPLACED)
         if screen == PHONE:  # there the legend scrolls
             scrolled = ("cut off: without", "cut off: worst")

@@ -5,7 +5,7 @@ import pytest
 
 from hyuav import Scenario
 from hyuav.physics.scenario import PRESETS
-from hyuav.viz.data.maps import Mode, sum_rates_over_map
+from hyuav.viz.data.maps import Mode, helper_map
 from hyuav.viz.html.maps import sum_rate_map
 
 SCENARIO = Scenario.preset("random_disk")
@@ -13,9 +13,9 @@ SCENARIO = Scenario.preset("random_disk")
 
 @pytest.mark.parametrize("mode", ["relay", "jamming", "better"])
 def test_a_map_shows_the_rates_on_one_scale(mode: Mode) -> None:
-    rates = sum_rates_over_map(SCENARIO, 10.0)
+    rates = helper_map(SCENARIO, 10.0)
     heat = sum_rate_map(SCENARIO, mode, 10.0).data[0]
-    np.testing.assert_allclose(heat.z, rates.of(mode), rtol=1e-6)
+    np.testing.assert_allclose(heat.z, rates.rates(mode), rtol=1e-6)
     assert (heat.zmin, heat.zmax) == (0.0, rates.better.max())
     assert heat.colorbar.title.text == "Secrecy sum-rate (bps/Hz)"
 
@@ -23,7 +23,7 @@ def test_a_map_shows_the_rates_on_one_scale(mode: Mode) -> None:
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_map_of_the_better_mode_outlines_where_each_mode_is_better(preset: str) -> None:
     scenario = Scenario.preset(preset)
-    rates = sum_rates_over_map(scenario, 10.0)
+    rates = helper_map(scenario, 10.0)
     lines = {
         trace.line.dash: np.array(trace.z)
         for trace in sum_rate_map(scenario, "better", 10.0).data
@@ -37,7 +37,7 @@ def test_the_map_of_the_better_mode_outlines_where_each_mode_is_better(preset: s
 
 def test_no_line_is_drawn_around_a_mode_that_is_nowhere_better() -> None:
     scenario = dataclasses.replace(SCENARIO, jamming_power=1e-9)
-    rates = sum_rates_over_map(scenario, 10.0)
+    rates = helper_map(scenario, 10.0)
     assert not (rates.relay > rates.jamming).any()
     figure = sum_rate_map(scenario, "better", 10.0)
     assert [trace.line.dash for trace in figure.data if trace.type == "contour"] == ["dash"]

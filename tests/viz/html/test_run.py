@@ -11,9 +11,9 @@ from rich.console import Console
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.experiments.policies import reference_policies
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.viz.html.html import Page, Section
+from hyuav.viz.data.runs import horizon_directory
+from hyuav.viz.html.document import Page, Section
 from hyuav.viz.html.run import run_page
-from hyuav.viz.paper.gallery import horizon_directory
 
 pytest_plugins = "sample_runs"
 

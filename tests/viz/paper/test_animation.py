@@ -6,15 +6,15 @@ from PIL import Image, ImageSequence
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation
+from hyuav.viz.data.flights import read_flight
 from hyuav.viz.paper.animation import animate_flight
-from hyuav.viz.paper.flights import first_flight
 
 
 def test_a_flight_in_motion_has_a_frame_for_the_start_and_each_slot(
     scenario: Scenario, evaluation: Evaluation, tmp_path: Path
 ) -> None:
     file = tmp_path / "new" / "flight.gif"
-    animate_flight(scenario, first_flight(evaluation.flights, "proposed"), file)
+    animate_flight(scenario, read_flight(scenario, evaluation.flights, "proposed"), file)
     with Image.open(file) as gif:
         frames = [
             (np.asarray(frame.convert("RGB")), frame.info["duration"])

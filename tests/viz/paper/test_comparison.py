@@ -14,12 +14,10 @@ from hyuav.experiments.comparison.statistics import (
     summarize_cells,
 )
 from hyuav.experiments.comparison.tables import MOST_COLUMNS, label
+from hyuav.viz.data.comparison import ENTRY_COLORS, entry_color, entry_line
 from hyuav.viz.paper.comparison import (
-    COLORS,
     cell_means,
-    color,
     curves_figure,
-    dash,
     improvement_bars,
     profiles_figure,
 )
@@ -72,15 +70,15 @@ def test_every_algorithm_is_named_in_its_color(algorithms: tuple[str, ...]) -> N
         assert legend(figure) == names
         lines = {str(line.get_label()): line for line in figure.axes[0].lines}
         colors = {name: to_hex(lines[label(name)].get_color()) for name in algorithms}
-        assert colors == {name: COLORS[name].lower() for name in algorithms}
+        assert colors == {name: ENTRY_COLORS[name].lower() for name in algorithms}
 
 
 def test_no_two_algorithms_have_the_same_color() -> None:
-    assert len(set(COLORS.values())) == len(ENTRIES)
+    assert len(set(ENTRY_COLORS.values())) == len(ENTRIES)
 
 
 def test_no_two_entries_of_an_ablation_look_alike() -> None:
-    looks = {(color(entry), dash(entry)) for entry in ABLATION}
+    looks = {(entry_color(entry), entry_line(entry)) for entry in ABLATION}
     assert len(looks) == len(ABLATION)
 
 
@@ -121,6 +119,6 @@ def test_of_many_only_the_first_is_set_beside_the_others() -> None:
 
 @pytest.mark.parametrize("entry", ["drifting", "ddpg_robust-noise_floor"])
 def test_what_is_not_offered_any_more_is_drawn_in_grey(entry: str) -> None:
-    assert color(entry) not in {to_hex(known) for known in COLORS.values()}
-    assert dash(entry) == 0
+    assert entry_color(entry) not in {to_hex(known) for known in ENTRY_COLORS.values()}
+    assert entry_line(entry) == 0
     assert label(entry)

@@ -4,8 +4,8 @@ from matplotlib.figure import Figure
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.viz.paper import COLORS, flight_map, trajectories
-from hyuav.viz.paper.flights import FLIGHT_PANELS, flight_tables
+from hyuav.viz.data.schemes import COLORS
+from hyuav.viz.paper.flights import FLIGHT_PANELS, flight_map, trajectories
 
 
 def texts(figure: Figure) -> list[str]:
@@ -37,19 +37,3 @@ def test_trajectories_lie_over_the_optimums_flight(
     assert [line.get_marker() for line in own if line.get_marker() in ("D", "*")] == ["D", "*"]
     assert {"Proposed", "Optimum", "start", "end", "coverage of L"} <= set(texts(figure))
     assert not {"Re-OT", "Ja-OT", "Re-LT"} & set(texts(figure))
-
-
-def test_the_tables_hold_the_flights_from_the_start_and_all_nodes(
-    scenario: Scenario, evaluation: Evaluation
-) -> None:
-    tables = flight_tables(scenario, evaluation.flights, ["re_lt", "re_ot"])
-    flight = tables[""]
-    assert set(flight["scheme"]) == {"re_lt"}
-    assert flight["slot"].tolist() == list(range(11))
-    assert flight[["x", "y"]].iloc[0].to_list() == list(scenario.helper_start)
-    assert flight["relay"].tolist() == [None] + [True] * 10
-    nodes = tables["nodes"].set_index("node")
-    places = nodes[["x", "y"]].T.to_dict("list")
-    assert places["UE 10"] == list(scenario.ue_positions[9])
-    assert places["E"] == list(scenario.eavesdropper_position)
-    assert nodes["coverage"].dropna().to_dict() == {"L": scenario.coverage_radius}

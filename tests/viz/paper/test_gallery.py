@@ -17,7 +17,8 @@ from hyuav.experiments.train import train
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters
-from hyuav.viz.paper.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
+from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
+from hyuav.viz.paper.gallery import FIGURES, draw
 
 OFF = LoggerParameters(mode="disabled")
 NEED_NO_EVALUATION = {"learning_curves", "sum_rate_maps"}
@@ -146,7 +147,9 @@ def test_flights_that_cannot_be_read_are_named(
         file.unlink()
         file.mkdir()
     for name in ("trajectories", "flight_map", "energy", "offloading", "animation"):
-        with pytest.raises(InputError, match=r"flights\.parquet: expected flights in Parquet"):
+        with pytest.raises(
+            InputError, match=r"flights\.parquet: expected the flights of an evaluation in Parquet"
+        ):
             draw(run, [name], console())
 
 

@@ -6,8 +6,9 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.viz.paper import COLORS
-from hyuav.viz.paper.horizons import horizon_table, sum_rates_by_horizon
+from hyuav.viz.data.runs import horizon_table
+from hyuav.viz.data.schemes import COLORS
+from hyuav.viz.paper.horizons import sum_rates_by_horizon
 
 
 def summaries(evaluation: Evaluation) -> list[dict[str, Any]]:

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from hyuav import Scenario
-from hyuav.viz.paper.maps import sum_rate_maps, sum_rate_table
+from hyuav.viz.data.maps import helper_map
+from hyuav.viz.paper.maps import sum_rate_maps
 
 SCENARIO = Scenario.preset("two_clusters")
 
 
 def test_the_maps_show_the_secrecy_sum_rate_in_each_mode_and_the_better() -> None:
-    table = sum_rate_table(SCENARIO, resolution=20.0)
+    table = helper_map(SCENARIO, resolution=20.0).table()
     at = table.set_index(["x", "y"])
     assert at.loc[(-20.0, -20.0), "relay"] == pytest.approx(1.713314, rel=1e-5)
     assert at.loc[(80.0, 80.0), "jamming"] == pytest.approx(2.714112, rel=1e-5)
@@ -26,5 +27,5 @@ def test_the_maps_show_the_secrecy_sum_rate_in_each_mode_and_the_better() -> Non
 
 def test_the_maps_can_be_drawn_where_the_edge_server_fills_up() -> None:
     crowded = dataclasses.replace(SCENARIO, edge_energy_budget=1.0)
-    free, full = (sum_rate_table(scenario, 20.0) for scenario in (SCENARIO, crowded))
-    assert 0 < full["better"].max() < free["better"].max()
+    free, full = (helper_map(scenario, 20.0).better for scenario in (SCENARIO, crowded))
+    assert 0 < full.max() < free.max()

@@ -2,28 +2,8 @@ import numpy as np
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.viz.paper.flights import first_flight
-from hyuav.viz.paper.over_time import (
-    energy_by_slot,
-    energy_table,
-    offloading_by_slot,
-    offloading_table,
-)
-
-
-def test_the_energy_of_every_node_is_told_in_every_slot(
-    scenario: Scenario, evaluation: Evaluation
-) -> None:
-    table = energy_table(scenario, evaluation.flights)
-    assert list(dict.fromkeys(table["scheme"])) == ["proposed", "re_lt", "ja_lt"]
-    assert len(table) == 3 * 10 * 12
-    own = table[table["scheme"] == "re_lt"]
-    slots = first_flight(evaluation.flights, "re_lt")
-    ues = own[own["node"].str.startswith("UE")]["energy"].to_numpy().reshape(10, 10)
-    np.testing.assert_allclose(ues, np.stack(slots["ue_energy"].to_list()))
-    helper = own[own["node"] == "H"]
-    np.testing.assert_allclose(helper["energy"], slots["helper_energy"])
-    assert set(helper["budget"]) == {scenario.helper_energy_budget}
+from hyuav.viz.data.flights import energy_table, offloading_table, read_flight
+from hyuav.viz.paper.over_time import energy_by_slot, offloading_by_slot
 
 
 def test_the_energy_figure_shows_the_ues_of_the_first_scheme(
@@ -32,30 +12,19 @@ def test_the_energy_figure_shows_the_ues_of_the_first_scheme(
     table = energy_table(scenario, evaluation.flights)
     of_ues, of_edge, of_helper = energy_by_slot(table).axes[:3]
     (image,) = of_ues.images
-    spent = first_flight(evaluation.flights, "proposed")["ue_energy"].to_list()
+    spent = read_flight(scenario, evaluation.flights, "proposed").energy[:, :10]
     shown = np.asarray(image.get_array(), dtype=float)
-    np.testing.assert_allclose(shown, 1e3 * np.stack(spent).T.astype(float))  # mJ
+    np.testing.assert_allclose(shown, 1e3 * spent.T)  # mJ
     assert list(image.get_extent()) == [0.5, 10.5, 10.5, 0.5]
     for axes, budget in ((of_edge, 24.0), (of_helper, 3.9)):  # J, kJ
         levels = [set(np.atleast_1d(line.get_ydata())) for line in axes.lines]
         assert {budget} in levels
 
 
-def test_offloading_is_told_for_every_ue_and_slot(evaluation: Evaluation) -> None:
-    table = offloading_table(evaluation.flights)
-    assert len(table) == 4 * 10 * 10
-    own = table[table["scheme"] == "ja_lt"]
-    assert not own["relay"].any()
-    assert (own.loc[~own["offloading"], "secrecy_rate"] == 0.0).all()
-    earned = own.groupby("slot")["secrecy_rate"].sum()
-    slots = first_flight(evaluation.flights, "ja_lt")
-    np.testing.assert_allclose(earned, slots["secrecy_sum_rate"], rtol=1e-5)
-
-
 def test_the_offloading_figure_counts_ues_and_leaves_out_who_computes_itself(
-    evaluation: Evaluation,
+    scenario: Scenario, evaluation: Evaluation
 ) -> None:
-    table = offloading_table(evaluation.flights)
+    table = offloading_table(scenario, evaluation.flights)
     of_modes, of_ues, of_counts = offloading_by_slot(table).axes[:3]
     proposed = table[table["scheme"] == "proposed"]
     modes = np.asarray(of_modes.images[0].get_array())
@@ -69,7 +38,7 @@ def test_the_offloading_figure_counts_ues_and_leaves_out_who_computes_itself(
 
 
 def test_a_scheme_alone_can_be_drawn(scenario: Scenario, evaluation: Evaluation) -> None:
-    alone = first_flight(evaluation.flights, "ja_lt")
-    of_modes, *_ = offloading_by_slot(offloading_table(alone)).axes
+    alone = read_flight(scenario, evaluation.flights, "ja_lt").rows
+    of_modes, *_ = offloading_by_slot(offloading_table(scenario, alone)).axes
     assert [tick.get_text() for tick in of_modes.get_yticklabels()] == ["Ja-LT"]
     assert energy_by_slot(energy_table(scenario, alone)).axes[0].images

@@ -5,8 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from hyuav.viz.paper import COLORS, COLUMN_WIDTH, LINES, save_figure
-from hyuav.viz.paper.style import COMPARED
+from hyuav.viz.paper import COLUMN_WIDTH, save_figure
 
 
 def test_a_figure_is_saved_for_print_at_the_width_of_a_column(tmp_path: Path) -> None:
@@ -25,8 +24,3 @@ def test_what_a_figure_shows_lies_beside_it(tmp_path: Path) -> None:
     save_figure(Figure(), tmp_path, "map", tables)
     assert (tmp_path / "map.csv").read_text() == "x\n1.5\n"
     assert pd.read_csv(tmp_path / "map_nodes.csv")["node"].tolist() == ["L", "E"]
-
-
-def test_the_five_schemes_differ_in_color_and_those_that_only_jam_are_dashed() -> None:
-    assert len({COLORS[scheme] for scheme in COMPARED}) == 5
-    assert {scheme for scheme in COMPARED if LINES[scheme] != "solid"} == {"ja_ot", "ja_lt"}

@@ -1,7 +1,5 @@
 """The tables that a comparison prints, each within 80 columns."""
 
-import math
-from collections.abc import Callable
 from typing import Any
 
 import pandas as pd
@@ -9,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hyuav._support.errors import harmless
+from hyuav._support.formatting import interval, or_never, percent
 from hyuav._support.terminal import print_line, print_table, results_table
 from hyuav.experiments.comparison.statistics import NEAR_OPTIMAL
 from hyuav.experiments.comparison.summary import Summary
@@ -84,8 +83,8 @@ def _table(title: str, *headings: str) -> Table:
 def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:
     table = _table(
         f"{name}, % of the optimum: interquartile mean and\n"
-        f"95 % interval; medians until {_percent(threshold)} was reached first",
-        *("Scheme", "IQM", "worst", f">= {_percent(threshold)}", "episodes", "seconds"),
+        f"95 % interval; medians until {percent(threshold, None)} was reached first",
+        *("Scheme", "IQM", "worst", f">= {percent(threshold, None)}", "episodes", "seconds"),
     )
     table.columns[1].justify = "left"
     for scheme, own in cells.groupby("scheme", sort=False):
@@ -95,15 +94,15 @@ def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:
                 str(scheme),
                 _interval(cell),
                 f"{100 * cell['worst']:.1f}",
-                f"{100 * cell['above_threshold']:.0f} %",
-                _finite(cell["median_episodes_to_threshold"], "{:.0f}".format),
-                _finite(cell["median_seconds_to_threshold"], "{:.1f}".format),
+                percent(cell["above_threshold"], 0),
+                or_never(cell["median_episodes_to_threshold"], 0),
+                or_never(cell["median_seconds_to_threshold"], 1),
             )
     return table
 
 
 def _algorithms(name: str, algorithms: pd.DataFrame, threshold: float) -> Table:
-    shares = (f">=\n{_percent(share)}" for share in (NEAR_OPTIMAL, threshold))
+    shares = (f">=\n{percent(share, None)}" for share in (NEAR_OPTIMAL, threshold))
     table = _table(
         f"{name}, % of the optimum: interquartile mean and 95 % interval",
         *("lear-\nners", "IQM", "median", "worst", *shares, "seconds"),
@@ -114,7 +113,7 @@ def _algorithms(name: str, algorithms: pd.DataFrame, threshold: float) -> Table:
             f"{row['learners']}",
             _interval(row),
             *(f"{100 * row[column]:.1f}" for column in ("median", "worst")),
-            *(f"{100 * row[column]:.0f} %" for column in ("near_optimal", "above_threshold")),
+            *(percent(row[column], 0) for column in ("near_optimal", "above_threshold")),
             f"{row['seconds']:.1f}",
         )
     return table
@@ -141,12 +140,4 @@ def _improvements(improvements: pd.DataFrame) -> Table:
 
 
 def _interval(row: "pd.Series[Any]") -> str:
-    return f"{100 * row['iqm']:.1f} [{100 * row['low']:.1f}, {100 * row['high']:.1f}]"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:g} %"
-
-
-def _finite(value: float, form: Callable[[float], str]) -> str:
-    return form(value) if math.isfinite(value) else "never"
+    return interval(100 * row["iqm"], 100 * row["low"], 100 * row["high"], 1)

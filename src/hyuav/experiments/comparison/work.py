@@ -9,12 +9,13 @@ from rich.console import Console
 
 from hyuav._support.errors import Halted
 from hyuav._support.terminal import make_progress
-from hyuav.experiments.comparison.directory import ComparisonDirectory, Summary
+from hyuav.experiments.comparison.directory import ComparisonDirectory
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import Compare, require_libraries
 from hyuav.experiments.comparison.processes import Workers
 from hyuav.experiments.comparison.ray import ray_workers
 from hyuav.experiments.comparison.shards import Shard
+from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.training import TrainingParameters

@@ -7,7 +7,7 @@ import streamlit as st
 import torch
 
 from hyuav.viz.dashboard import explorer_page, flights_page, runs_page
-from hyuav.viz.dashboard.index import RunIndex
+from hyuav.viz.data.index import RunIndex
 
 PAGES = {"Runs": runs_page, "Flights": flights_page, "Scenario explorer": explorer_page}
 

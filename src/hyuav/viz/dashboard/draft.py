@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from hyuav._support.errors import InputError, rejection
+from hyuav.envs.rendering import EAVESDROPPER_LABEL, LEGITIMATE_LABEL
 from hyuav.physics.scenario import PRESETS, Point, Scenario
 
 Draft = dict[str, Any]
 """A value for each field of :class:`Scenario`: its own, or the text that was typed in."""
 
 NODES = {
-    "legitimate_position": "legitimate UAV (L)",
-    "eavesdropper_position": "eavesdropper (E)",
+    "legitimate_position": LEGITIMATE_LABEL,
+    "eavesdropper_position": EAVESDROPPER_LABEL,
     "helper_start": "helper's start (H)",
 }
 """The nodes that every scenario has, beside the UEs."""

@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 import streamlit as st
 
 from hyuav._support.errors import InputError
+from hyuav._support.formatting import percent
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import named_scenario
 from hyuav.experiments.schemes import LEARNED, OPTIMA
@@ -15,7 +16,9 @@ from hyuav.physics.slot import SCHEMES
 from hyuav.viz.dashboard import draft as drafts
 from hyuav.viz.dashboard.draft_widgets import editor, place
 from hyuav.viz.dashboard.flights_page import player
-from hyuav.viz.dashboard.flying import (
+from hyuav.viz.dashboard.overlay import QUANTITIES, add_flights, explorer_map
+from hyuav.viz.dashboard.plain import plain, refusals
+from hyuav.viz.data.flying import (
     COARSE_DRAWS,
     EPISODES,
     FINE_DRAWS,
@@ -25,10 +28,8 @@ from hyuav.viz.dashboard.flying import (
     learner_label,
     resolution,
 )
-from hyuav.viz.dashboard.index import RunIndex
-from hyuav.viz.dashboard.overlay import QUANTITIES, add_flights, explorer_map
-from hyuav.viz.dashboard.plain import plain, refusals
-from hyuav.viz.html.style import scheme_label
+from hyuav.viz.data.index import RunIndex
+from hyuav.viz.data.schemes import scheme_label
 
 KEPT = (
     *("draft", "original", "valid", "node", "begin", "rule", "mapped", "pilot", "pilot_learner"),
@@ -232,13 +233,13 @@ def _tell(evaluation: Evaluation, rule: str) -> None:
         column.metric(
             scheme_label(name),
             f"{result['secrecy_sum_rate']['mean']:.2f} bps/Hz",
-            None if name == OPTIMA[rule] else f"{100 * share:.1f} % of the optimum",
+            None if name == OPTIMA[rule] else f"{percent(share)} of the optimum",
             delta_color="off",
             border=True,
         )
         column.caption(
-            f"{100 * result['relay_share']:.0f} % of the slots relay, "
-            f"{100 * result['offloading_share']:.0f} % of the UEs offload"
+            f"{percent(result['relay_share'], 0)} of the slots relay, "
+            f"{percent(result['offloading_share'], 0)} of the UEs offload"
         )
 
 

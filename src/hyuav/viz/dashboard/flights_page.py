@@ -8,25 +8,18 @@ import pandas as pd
 import streamlit as st
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.files import read_parquet
 from hyuav.experiments.evaluation import FLIGHTS_FILE
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.dashboard.flying import checkpoint_of, flown_by, learner_label
-from hyuav.viz.dashboard.index import RunIndex, Stamp
 from hyuav.viz.dashboard.plain import plain, refusals
+from hyuav.viz.data.flying import checkpoint_of, flown_by, learner_label
+from hyuav.viz.data.index import RunIndex, Stamp
+from hyuav.viz.data.reading import read_flights
+from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html.player import flight_player
-from hyuav.viz.html.style import scheme_label
 
 KEPT = ("flown_run", "flown_source", "flown_learner", "flown_scheme", "flown_episode")
 
 KEPT_FLIGHTS, FLOWN_NOW = "kept by its evaluation", "of its best weights, flown now"
-
-COLUMNS = {
-    *("scheme", "episode", "slot", "x", "y", "relay", "off_map", "secrecy_sum_rate"),
-    *("relay_sum_rate", "jamming_sum_rate", "edge_energy", "helper_energy", "budget_violation"),
-    *("offloading", "secrecy_rate", "ue_energy"),
-}
-"""Of the table of flights, as :func:`hyuav.experiments.evaluation.slot_table` makes it."""
 
 WIDE, NARROW = "player-wide", "player-narrow"
 """Containers of the player, of which a page shows the one that suits its width."""
@@ -86,30 +79,25 @@ def _evaluated(index: RunIndex, name: str) -> tuple[Scenario, pd.DataFrame]:
         accepted = "a run whose evaluation.json names the scenario's parameters"
         raise InputError(rejection("run", name, accepted))
     state = path.stat()
-    flights = read_flights(path, (state.st_mtime_ns, state.st_size))
+    flights = kept_flights(path.parent, (state.st_mtime_ns, state.st_size))
     return Scenario.from_dict(parameters), flights
 
 
 @lru_cache(maxsize=8)
-def read_flights(path: Path, stamp: Stamp) -> pd.DataFrame:  # noqa: ARG001 - read anew if changed
-    """A table of flights.
+def kept_flights(directory: Path, stamp: Stamp) -> pd.DataFrame:
+    """The flights of an evaluation, which are read anew only where the file has changed.
 
     Args:
-        path: of ``flights.parquet``.
-        stamp: its modification time and size.
+        directory: of ``flights.parquet``.
+        stamp: the file's modification time and size.
 
     Raises:
-        InputError: it is damaged or another program's.
+        InputError: the file is damaged, another program's, or too large for a page.
     """
-    accepted = "the flights of an evaluation"
-    if path.is_file() and path.stat().st_size > _LARGEST_FILE:
-        raise InputError(rejection("flights", str(path), f"{accepted}, in a smaller file"))
-    flights = read_parquet(path, accepted)
-    missing = COLUMNS - set(flights.columns)
-    if missing or flights.empty:
-        accepted += f" with {', '.join(sorted(missing)) or 'rows'}"
-        raise InputError(rejection("flights", str(path), accepted))
-    return flights
+    if stamp[-1] > _LARGEST_FILE:
+        accepted = f"at most {_LARGEST_FILE} bytes"
+        raise InputError(rejection("flights", str(directory / FLIGHTS_FILE), accepted))
+    return read_flights(directory)
 
 
 def _flown_now(index: RunIndex, name: str) -> tuple[Scenario, pd.DataFrame]:
@@ -149,16 +137,10 @@ def player(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode: int)
     Raises:
         InputError: the flights are not those of this scenario.
     """
-    try:
-        figures = {
-            name: flight_player(scenario, flights, scheme, episode, narrow=name == NARROW)
-            for name in (WIDE, NARROW)
-        }
-    except (TypeError, ValueError, KeyError, IndexError) as error:
-        if isinstance(error, InputError):
-            raise
-        accepted = "flights of this scenario, a row per slot"
-        raise InputError(rejection("flights", scheme, accepted)) from None
+    figures = {
+        name: flight_player(scenario, flights, scheme, episode, narrow=name == NARROW)
+        for name in (WIDE, NARROW)
+    }
     st.html(_BY_WIDTH)  # a server does not know how wide a page is
     for name, figure in figures.items():
         with st.container(key=name):

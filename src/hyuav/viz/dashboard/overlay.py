@@ -1,28 +1,22 @@
 """The explorer's map: what a helper position brings, and the flights over it."""
 
 from collections.abc import Iterator
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
-import torch
-from numpy.typing import NDArray
 
-from hyuav.envs.rendering import HELPER_COLOR
-from hyuav.physics.offloading import prefers_relay
+from hyuav.envs.rendering import HELPER_COLOR, runs_of_one_mode
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SecureOffloadingSystem
-from hyuav.viz.data.maps import Mode
-from hyuav.viz.html.maps import sum_rate_map
-from hyuav.viz.html.style import scheme_color, scheme_label
+from hyuav.viz.data.flights import Flight, first_flights
+from hyuav.viz.data.maps import RULE_MODES, helper_map
+from hyuav.viz.data.schemes import scheme_color, scheme_label
+from hyuav.viz.html.maps import map_figure
+from hyuav.viz.html.style import plain
 
 QUANTITIES = {"rate": "Secrecy sum-rate", "coverage": "UEs that can offload"}
 """What the map can show at each helper position."""
-
-MODES: dict[str, Mode] = {"hybrid": "better", "relay": "relay", "jamming": "jamming"}
-"""The helper's mode on the map, by who chooses it."""
 
 POINTS_PER_SIDE, CLICKS_PER_SIDE = 100, 50
 """Of the map, and of the raster of positions that can be clicked on."""
@@ -38,12 +32,11 @@ def explorer_map(scenario: Scenario, rule: str, quantity: str) -> go.Figure:
         rule: who chooses the mode.
         quantity: one of :data:`QUANTITIES`.
     """
-    resolution = scenario.map_side / POINTS_PER_SIDE
-    figure = sum_rate_map(scenario, MODES[rule], resolution)
+    mode, brings = RULE_MODES[rule], helper_map(scenario, scenario.map_side / POINTS_PER_SIDE)
+    figure = map_figure(scenario, brings, mode)
     if quantity == "coverage":
-        counts = offloading_counts(scenario, rule, resolution)
         figure.data[0].update(
-            z=counts,
+            z=brings.offloading(mode),
             zmax=scenario.num_ues,
             colorscale="Cividis",
             hovertemplate="helper at (%{x:.0f}, %{y:.0f}) m: %{z} UEs<extra></extra>",
@@ -76,8 +69,8 @@ def add_flights(figure: go.Figure, scenario: Scenario, flights: pd.DataFrame) ->
         flights: a row per slot, as in :attr:`hyuav.experiments.evaluation.Evaluation.flights`.
     """
     map_and_nodes = len(figure.data)
-    for scheme, rows in flights[flights["episode"] == 0].groupby("scheme", sort=False):
-        figure.add_traces(list(_flight(scenario, str(scheme), rows)))
+    for flight in first_flights(scenario, flights, flights["scheme"]).values():
+        figure.add_traces(list(_flight(flight)))
     figure.for_each_trace(_stay_bright, selector={"type": "scatter"})
     drawn = figure.data[:map_and_nodes]
     below = [trace for trace in drawn if trace.type != "scatter"]
@@ -85,56 +78,26 @@ def add_flights(figure: go.Figure, scenario: Scenario, flights: pd.DataFrame) ->
     figure.data = (*below, *figure.data[map_and_nodes:], *above)
 
 
-def offloading_counts(scenario: Scenario, rule: str, resolution: float) -> NDArray[np.int64]:
-    """How many UEs offload at each helper position, without fading: a row per y, a column per x.
-
-    Where the UEs can fill the edge server, their tasks are of mean size.
-
-    Args:
-        scenario: to count in.
-        rule: who chooses the mode.
-        resolution: of the map in m.
-    """
-    half = scenario.map_side / 2
-    across = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64)
-    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
-    y, x = torch.meshgrid(across, across, indexing="ij")
-    distances = system.distances(torch.stack([x, y], dim=-1))
-    tasks = system.mean_tasks(tuple(x.shape)) if system.edge_can_saturate else None
-    gains = system.channel_gains(distances, None)
-    relay = system.relay_outcome(distances, gains, tasks)
-    jamming = system.jamming_outcome(gains, tasks)
-    relaying = relay.offloading.expand(*x.shape, -1).sum(dim=-1)
-    jammed = jamming.offloading.expand(*x.shape, -1).sum(dim=-1)
-    better = torch.where(prefers_relay(relay.sum_rate, jamming.sum_rate), relaying, jammed)
-    return {"hybrid": better, "relay": relaying, "jamming": jammed}[rule].numpy()
-
-
 def _colorbar(title: str) -> dict[str, Any]:
     above = {"orientation": "h", "x": 0.5, "xanchor": "center", "y": 1.01, "yanchor": "bottom"}
     return {"title": {"text": title, "side": "top"}, "thickness": 12, "len": 0.9, **above}
 
 
-def _flight(scenario: Scenario, scheme: str, rows: pd.DataFrame) -> Iterator[go.Scatter]:
+def _flight(flight: Flight) -> Iterator[go.Scatter]:
     """The path on a white ground, a piece for each stretch in one mode."""
-    rows = rows.sort_values("slot")
-    path = np.vstack([scenario.helper_start, rows[["x", "y"]].to_numpy(dtype=float)])
-    label, color = scheme_label(scheme), scheme_color(scheme)
+    label, color = plain(scheme_label(flight.scheme)), scheme_color(flight.scheme)
     common = {"legendgroup": label, "hoverinfo": "skip"}
-    ground = {"color": "white", "width": 6}
     yield go.Scatter(
-        x=path[:, 0],
-        y=path[:, 1],
+        x=flight.path[:, 0],
+        y=flight.path[:, 1],
         mode="lines",
-        line=ground,
+        line={"color": "white", "width": 6},
         opacity=0.8,
         showlegend=False,
         **common,
     )
-    stretches = groupby(enumerate(rows["relay"].astype(bool)), key=lambda slot: slot[1])
-    for number, (relay, slots) in enumerate(stretches):
-        flown = [index for index, _ in slots]
-        piece = path[flown[0] : flown[-1] + 2]
+    for relay, first, last in runs_of_one_mode(flight.relay):
+        piece = flight.path[first : last + 1]
         yield go.Scatter(
             x=piece[:, 0],
             y=piece[:, 1],
@@ -142,7 +105,7 @@ def _flight(scenario: Scenario, scheme: str, rows: pd.DataFrame) -> Iterator[go.
             line={"color": color, "width": 3, "dash": "solid" if relay else "6px,4px"},
             marker={"color": color, "size": 5},
             name=label,
-            showlegend=number == 0,
+            showlegend=first == 0,
             **common,
         )
 

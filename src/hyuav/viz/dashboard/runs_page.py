@@ -2,18 +2,18 @@
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 import plotly.graph_objects as go
 import streamlit as st
 
 from hyuav._support.errors import InputError
-from hyuav.viz.dashboard.curves import X_AXES, Choice, axes_of, comparison
-from hyuav.viz.dashboard.index import MOST_DRAWN, STATES, RunEntry, RunIndex
+from hyuav.viz.dashboard.curves import X_AXES, Choice, comparison
 from hyuav.viz.dashboard.plain import plain, refusals
-from hyuav.viz.dashboard.tables import differences, outcomes
+from hyuav.viz.data.configuration import differences
+from hyuav.viz.data.curves import last_results, quantities
+from hyuav.viz.data.index import MOST_DRAWN, STATES, RunEntry, RunIndex
 
 KEPT = (
     *("search", "scenarios", "algorithms", "schemes", "states"),
@@ -194,7 +194,7 @@ def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
         st.info("No episode of this quantity is complete yet.")
         return
     st.plotly_chart(figure, key="curves", theme=None, config={"displaylogo": False})
-    reached = outcomes(metrics, choice)
+    reached = last_results(metrics, choice.y)
     st.dataframe(reached, hide_index=True, column_config={"Run": _name_column(metrics)})
     if len(metrics) > 1:
         st.subheader("What sets these runs apart", anchor=False)
@@ -209,49 +209,36 @@ def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
             st.dataframe(table)
 
 
-@dataclass(frozen=True)
-class _Shown:
+class _Shown(NamedTuple):
     """The figure of the last renewal, and what it was made of."""
 
-    metrics: Mapping[str, pd.DataFrame]
-    optima: Mapping[str, Mapping[str, float]]
-    choice: Choice
     figure: go.Figure
-
-    def shows(
-        self,
-        metrics: Mapping[str, pd.DataFrame],
-        optima: Mapping[str, Mapping[str, float]],
-        choice: Choice,
-    ) -> bool:
-        """Whether it was made of the same, where metrics without new rows are the same table."""
-        return (
-            (self.optima, self.choice) == (optima, choice)
-            and list(self.metrics) == list(metrics)
-            and all(rows is metrics[name] for name, rows in self.metrics.items())
-        )
+    metrics: Mapping[str, pd.DataFrame]
+    made_of: tuple[Any, ...]
 
 
 def _figure(
     metrics: Mapping[str, pd.DataFrame], optima: Mapping[str, Mapping[str, float]], choice: Choice
 ) -> go.Figure:
-    """The figure, made anew only where something has changed."""
+    """The figure, made anew only where something has changed.
+
+    Metrics without new rows are the same table as before.
+    """
     shown: _Shown | None = st.session_state.get("shown")
-    if shown is None or not shown.shows(metrics, optima, choice):
-        shown = _Shown(metrics, optima, choice, comparison(metrics, optima, choice))
+    made_of = optima, choice, [(name, id(rows)) for name, rows in metrics.items()]
+    if shown is None or shown.made_of != made_of:
+        shown = _Shown(comparison(metrics, optima, choice), metrics, made_of)
         st.session_state["shown"] = shown
     return shown.figure
 
 
 def _choice(metrics: Mapping[str, pd.DataFrame]) -> Choice:
-    quantities = axes_of(metrics)
+    names = quantities(metrics)
     what, against, smoothing, colors = st.columns([3, 3, 3, 2])
-    if st.session_state.get("quantity") not in quantities:
-        st.session_state["quantity"] = next(iter(quantities), None)
+    if st.session_state.get("quantity") not in names:
+        st.session_state["quantity"] = next(iter(names), None)
     return Choice(
-        y=what.selectbox(
-            "Quantity", list(quantities), format_func=quantities.__getitem__, key="quantity"
-        ),
+        y=what.selectbox("Quantity", list(names), format_func=names.__getitem__, key="quantity"),
         x=against.selectbox("Against", list(X_AXES), format_func=X_AXES.__getitem__, key="against"),
         smoothing=smoothing.slider(
             "Smoothing (episodes)",

@@ -1,20 +1,25 @@
-"""The secrecy sum-rate at every helper position of a scenario's map."""
+"""What each helper position of a scenario's map brings."""
 
 from typing import Literal, NamedTuple
 
 import numpy as np
+import pandas as pd
 import torch
 from numpy.typing import NDArray
 
+from hyuav.physics.offloading import prefers_relay
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import SecureOffloadingSystem
 
 Mode = Literal["relay", "jamming", "better"]
 """The helper's mode on a map; ``better`` is the one that brings more at each position."""
 
+RULE_MODES: dict[str, Mode] = {"hybrid": "better", "relay": "relay", "jamming": "jamming"}
+"""The helper's mode on the map, by who chooses it."""
 
-class SumRateMap(NamedTuple):
-    """Secrecy sum-rates over the map, a row per y and a column per x."""
+
+class HelperMap(NamedTuple):
+    """Secrecy sum-rates and offloading UEs over the map, a row per y and a column per x."""
 
     axis: NDArray[np.float64]
     """The coordinates along x, and along y: (N,) m."""
@@ -22,19 +27,41 @@ class SumRateMap(NamedTuple):
     """C_1: (N, N) bps/Hz."""
     jamming: NDArray[np.float64]
     """C_0: (N, N) bps/Hz."""
+    relay_offloading: NDArray[np.int64]
+    """How many UEs offload while the helper relays: (N, N)."""
+    jamming_offloading: NDArray[np.int64]
+    """How many UEs offload while the helper jams: (N, N)."""
+    prefers_relay: NDArray[np.bool_]
+    """Where relaying is the better mode: (N, N)."""
 
     @property
     def better(self) -> NDArray[np.float64]:
         """What the better mode brings: (N, N) bps/Hz."""
         return np.maximum(self.relay, self.jamming)
 
-    def of(self, mode: Mode) -> NDArray[np.float64]:
-        """The rates in a mode: (N, N) bps/Hz."""
+    def rates(self, mode: Mode) -> NDArray[np.float64]:
+        """The secrecy sum-rates in a mode: (N, N) bps/Hz."""
         return {"relay": self.relay, "jamming": self.jamming, "better": self.better}[mode]
 
+    def offloading(self, mode: Mode) -> NDArray[np.int64]:
+        """How many UEs offload in a mode: (N, N)."""
+        relay, jamming = self.relay_offloading, self.jamming_offloading
+        better = np.where(self.prefers_relay, relay, jamming)
+        return {"relay": relay, "jamming": jamming, "better": better}[mode]
 
-def sum_rates_over_map(scenario: Scenario, resolution: float = 1.0) -> SumRateMap:
-    """The secrecy sum-rate at every helper position, in each mode.
+    def table(self) -> pd.DataFrame:
+        """Row by row from the south-west: ``x`` and ``y`` in m, and the sum-rates in bps/Hz.
+
+        These are ``relay``, ``jamming``, and the ``better`` of both.
+        """
+        x, y = np.meshgrid(self.axis, self.axis)
+        columns = {"x": x, "y": y, "relay": self.relay, "jamming": self.jamming}
+        columns |= {"better": self.better}
+        return pd.DataFrame({name: values.ravel() for name, values in columns.items()})
+
+
+def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
+    """What each helper position brings in each mode.
 
     Without fading; where the UEs can fill the edge server, with tasks of mean size.
 
@@ -44,8 +71,16 @@ def sum_rates_over_map(scenario: Scenario, resolution: float = 1.0) -> SumRateMa
     """
     half = scenario.map_side / 2
     axis = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64)
+    y, x = torch.meshgrid(axis, axis, indexing="ij")
     system = SecureOffloadingSystem(scenario, dtype=torch.float64)
-    positions = torch.cartesian_prod(axis, axis).reshape(len(axis), len(axis), 2)
-    tasks = system.mean_tasks(positions.shape[:-1]) if system.edge_can_saturate else None
-    relay, jamming = (rates.T.numpy() for rates in system.sum_rates(positions, tasks=tasks))
-    return SumRateMap(axis.numpy(), relay, jamming)
+    distances = system.distances(torch.stack([x, y], dim=-1))
+    tasks = system.mean_tasks(tuple(x.shape)) if system.edge_can_saturate else None
+    gains = system.channel_gains(distances, None)
+    relay = system.relay_outcome(distances, gains, tasks)
+    jamming = system.jamming_outcome(gains, tasks)
+    rates = torch.broadcast_tensors(relay.sum_rate, jamming.sum_rate)
+    counts = (outcome.offloading.expand(*x.shape, -1).sum(dim=-1) for outcome in (relay, jamming))
+    return HelperMap(
+        axis.numpy(),
+        *(values.numpy() for values in (*rates, *counts, prefers_relay(*rates))),
+    )

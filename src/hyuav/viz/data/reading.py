@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from hyuav._support.errors import InputError
 from hyuav._support.files import read_parquet
 from hyuav._support.parameters import read_yaml
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
-from hyuav.experiments.schemes import LABELS
+from hyuav.experiments.schemes import LABELS, OPTIMA
 
 _PER_UE = {"offloading", "secrecy_rate", "ue_energy"}
 _FLIGHT_COLUMNS = {
@@ -32,6 +32,26 @@ def readable_config(directory: Path) -> dict[str, Any]:
         return read_yaml(directory / "config.yaml")
     except InputError:
         return {}
+
+
+def read_evaluation(directory: Path) -> dict[str, Any]:
+    """The content of ``evaluation.json``.
+
+    Raises:
+        InputError: there is none, or it is damaged or another program's.
+    """
+    file = _existing(directory, EVALUATION_FILE)
+    content = readable_evaluation(directory)
+    if content is None:
+        raise InputError(f"{file}: expected an evaluation in JSON (recipes/evaluate.py makes it)")
+    return content
+
+
+def _existing(directory: Path, name: str) -> Path:
+    file = directory / name
+    if not file.exists():
+        raise InputError(f"there is no {name} in {directory} (recipes/evaluate.py makes it)")
+    return file
 
 
 def readable_evaluation(directory: Path) -> dict[str, Any] | None:
@@ -60,10 +80,40 @@ def _is_account(account: dict[str, Any]) -> bool:
     )
 
 
+def optima_of(evaluation: Mapping[str, Any]) -> dict[str, float]:
+    """By mode rule, what the best flight earns in bps/Hz, where it was evaluated."""
+    results = evaluation["schemes"]
+    return {
+        rule: float(results[optimum]["secrecy_sum_rate"]["mean"])
+        for rule, optimum in OPTIMA.items()
+        if optimum in results
+    }
+
+
+def read_flights(directory: Path) -> pd.DataFrame:
+    """The rows of ``flights.parquet``.
+
+    Raises:
+        InputError: there are none, or they are damaged or another program's.
+    """
+    file, accepted = _existing(directory, FLIGHTS_FILE), "the flights of an evaluation"
+    if not file.is_file():
+        raise InputError(f"{file}: expected {accepted} in Parquet (not a file)")
+    table = read_parquet(file, accepted)
+    missing = ", ".join(sorted(_FLIGHT_COLUMNS - set(table.columns)))
+    if missing or table.empty:
+        raise InputError(f"{file}: expected {accepted} in Parquet (with {missing or 'rows'})")
+    if not _is_flown(table):
+        raise InputError(f"{file}: expected {accepted} in Parquet (of finite numbers)")
+    return table
+
+
 def readable_flights(directory: Path) -> pd.DataFrame | None:
     """The rows of ``flights.parquet``; None where there are none that can be read."""
-    table = readable_table(directory / FLIGHTS_FILE, _FLIGHT_COLUMNS)
-    return table if table is not None and _is_flown(table) else None
+    try:
+        return read_flights(directory)
+    except InputError:
+        return None
 
 
 def _is_flown(table: pd.DataFrame) -> bool:

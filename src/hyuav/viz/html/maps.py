@@ -4,10 +4,15 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from hyuav.envs.rendering import EAVESDROPPER_COLOR, LEGITIMATE_COLOR
+from hyuav.envs.rendering import (
+    EAVESDROPPER_COLOR,
+    EAVESDROPPER_LABEL,
+    LEGITIMATE_COLOR,
+    LEGITIMATE_LABEL,
+)
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.data.maps import Mode, sum_rates_over_map
-from hyuav.viz.html.style import axis, base_layout, translucent
+from hyuav.viz.data.maps import HelperMap, Mode, helper_map
+from hyuav.viz.html.style import base_layout, square_map, translucent
 
 HEIGHT = 480
 """Of the figure in pixels."""
@@ -27,8 +32,12 @@ def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 
         mode: of the helper.
         resolution: of the map in m.
     """
-    rates = sum_rates_over_map(scenario, resolution)
-    shown = rates.of(mode).astype(np.float32)
+    return map_figure(scenario, helper_map(scenario, resolution), mode)
+
+
+def map_figure(scenario: Scenario, rates: HelperMap, mode: Mode) -> go.Figure:
+    """What :func:`sum_rate_map` draws, of a map that is computed already."""
+    shown = rates.rates(mode).astype(np.float32)
     figure = go.Figure(layout=base_layout())
     figure.add_heatmap(
         x=rates.axis,
@@ -50,15 +59,12 @@ def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 
         _outline(figure, rates.axis, rates.jamming > rates.relay, "dash")
         _outline(figure, rates.axis, rates.relay > rates.jamming, "solid")
     _add_nodes(figure, scenario)
-    half = scenario.map_side / 2
-    square = {"range": [-half, half], "constrain": "domain", "nticks": 6, "mirror": True}
     figure.update_layout(
         title={"text": TITLES[mode], "x": 0.5, "xanchor": "center", "font": {"size": 14}},
         height=HEIGHT,
         margin={"l": 50, "r": 15, "t": 35, "b": 125},
         showlegend=False,
-        xaxis=axis("x (m)", **square),
-        yaxis=axis("y (m)", **square, scaleanchor="x", scaleratio=1),
+        **square_map(scenario.map_side / 2),
     )
     return figure
 
@@ -92,9 +98,9 @@ def _add_nodes(figure: go.Figure, scenario: Scenario) -> None:
     )
     nodes = (
         ("UE", x, y, {"size": 6, "color": "#000000"}),
-        ("legitimate UAV (L)", *_at(scenario.legitimate_position, "square", LEGITIMATE_COLOR)),
+        (LEGITIMATE_LABEL, *_at(scenario.legitimate_position, "square", LEGITIMATE_COLOR)),
         (
-            "eavesdropper (E)",
+            EAVESDROPPER_LABEL,
             *_at(scenario.eavesdropper_position, "triangle-down", EAVESDROPPER_COLOR),
         ),
     )

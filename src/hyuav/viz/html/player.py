@@ -4,11 +4,12 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.html.player_flight import Flight, read_flight
+from hyuav.viz.data.flights import Flight, read_flight
+from hyuav.viz.data.schemes import scheme_color, scheme_label
 from hyuav.viz.html.player_layout import animation_controls, layouts
 from hyuav.viz.html.player_map import fixed_on_map, moving_on_map
 from hyuav.viz.html.player_panels import fixed_in_panels, highest, moving_in_panels
-from hyuav.viz.html.style import base_layout, scheme_color, scheme_label
+from hyuav.viz.html.style import base_layout, plain
 
 
 def flight_player(
@@ -37,7 +38,7 @@ def flight_player(
         InputError: there is no such flight, or it is not one of this scenario.
     """
     flight = read_flight(scenario, flights, scheme, episode)
-    color, num_slots = scheme_color(scheme), len(flight.relay)
+    color, num_slots = scheme_color(scheme), flight.num_slots
     fixed = [*fixed_on_map(scenario, flight), *fixed_in_panels(flight)]
     moving = [
         [
@@ -46,7 +47,7 @@ def flight_player(
         ]
         for slot in range(num_slots)
     ]
-    titles = [_title(scheme, flight, slot) for slot in range(num_slots)]
+    titles = [_title(flight, slot) for slot in range(num_slots)]
     both = layouts(scenario, num_slots, highest(flight))
     figure = go.Figure(
         data=[*fixed, *moving[0]],
@@ -68,13 +69,13 @@ def flight_player(
     return figure
 
 
-def _title(scheme: str, flight: Flight, slot: int) -> str:
+def _title(flight: Flight, slot: int) -> str:
     """What a person reads of the slot, on two lines."""
     row, relay = flight.rows.iloc[slot], flight.relay[slot]
     count, total = int(flight.offloading[slot].sum()), flight.offloading.shape[1]
-    mode = "relay" if relay else "jamming"
+    name, mode = plain(scheme_label(flight.scheme)), "relay" if relay else "jamming"
     off_map = ", turned back at the edge" if row["off_map"] else ""
     return (
-        f"<b>{scheme_label(scheme)}, slot {slot + 1} of {len(flight.relay)}: {mode}</b>{off_map}"
+        f"<b>{name}, slot {slot + 1} of {flight.num_slots}: {mode}</b>{off_map}"
         f"<br>{count} of {total} UEs offload, {row['secrecy_sum_rate']:.2f} bps/Hz"
     )

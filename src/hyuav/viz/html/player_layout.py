@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.html.style import axis
+from hyuav.viz.html.style import axis, legend_below, square_map
 
 _SLOT_SECONDS = 0.6
 
@@ -19,15 +19,12 @@ def layouts(
         num_slots: T of the flight.
         highest: of the secrecy rates and of the sum-rates, in bps/Hz.
     """
-    half = scenario.map_side / 2
     rate, sum_rate = (1.18 * max(value, 1e-3) for value in highest)
-    square = {"range": [-half, half], "constrain": "domain", "nticks": 6, "mirror": True}
     shared = {
         "title": {"x": 0.0, "xref": "paper", "xanchor": "left", "font": {"size": 14}},
         "bargap": 0.25,
         "barmode": "overlay",
-        "xaxis": axis("x (m)", **square),
-        "yaxis": axis("y (m)", **square, scaleanchor="x", scaleratio=1),
+        **square_map(scenario.map_side / 2),
         "xaxis2": axis("UE", anchor="y2", type="category"),
         "yaxis2": axis("Secrecy rate<br>(bps/Hz)", anchor="x2", range=[0, rate], nticks=5),
         "xaxis3": axis("UEs (mJ), L and H (J)", anchor="y3", type="category"),
@@ -47,7 +44,7 @@ def _wide() -> dict[str, Any]:
         "xaxis.domain": [0.0, 0.48],
         "yaxis.domain": [0.0, 1.0],
         **_panels(beside, {4: [0.74, 1.0], 2: [0.37, 0.63], 3: [0.0, 0.26]}),
-        "legend": _legend(-0.1),
+        "legend": legend_below(y=-0.1, xanchor="left"),
         "sliders[0].x": 0.17,
         "sliders[0].len": 0.83,
         "sliders[0].y": -0.22,
@@ -64,7 +61,9 @@ def _narrow() -> dict[str, Any]:
         "xaxis.domain": [0.0, 1.0],
         "yaxis.domain": [0.7, 1.0],
         **_panels([0.0, 1.0], {4: [0.39, 0.515], 2: [0.195, 0.32], 3: [0.0, 0.125]}),
-        "legend": _legend(-0.055) | {"entrywidth": 107, "x": -0.16, "font": {"size": 10.5}},
+        "legend": legend_below(
+            x=-0.16, xanchor="left", y=-0.055, entrywidth=107, font={"size": 10.5}
+        ),
         "sliders[0].x": 0.0,
         "sliders[0].len": 1.0,
         "sliders[0].y": 0.665,
@@ -79,10 +78,6 @@ def _panels(across: list[float], up: dict[int, list[float]]) -> dict[str, Any]:
         for number, own in up.items()
         for name, domain in (("xaxis", across), ("yaxis", own))
     }
-
-
-def _legend(y: float) -> dict[str, Any]:
-    return {"orientation": "h", "x": 0.0, "xanchor": "left", "y": y, "yanchor": "top"}
 
 
 def animation_controls(num_slots: int) -> dict[str, Any]:

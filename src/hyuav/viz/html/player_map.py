@@ -6,11 +6,19 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from hyuav.envs.rendering import EAVESDROPPER_COLOR, LEGITIMATE_COLOR, OKABE_ITO
+from hyuav.envs.rendering import (
+    EAVESDROPPER_COLOR,
+    EAVESDROPPER_LABEL,
+    HELPER_LABEL,
+    LEGITIMATE_COLOR,
+    LEGITIMATE_LABEL,
+    OKABE_ITO,
+    runs_of_one_mode,
+)
 from hyuav.physics.channel import horizontal_distance
 from hyuav.physics.offloading import covered_by_legitimate, covered_by_relay
 from hyuav.physics.scenario import Point, Scenario
-from hyuav.viz.html.player_flight import Flight
+from hyuav.viz.data.flights import Flight
 from hyuav.viz.html.style import translucent
 
 Trace = dict[str, Any]
@@ -35,7 +43,7 @@ def trace(kind: str, **values: Any) -> Trace:
 
 def fixed_on_map(scenario: Scenario, flight: Flight) -> list[Trace]:
     """What stays from slot to slot."""
-    x, y = flight.path.T.tolist()
+    x, y = flight.path.round(2).T.tolist()
     circle = _circle(scenario.legitimate_position, scenario.coverage_radius)
     return [
         _disk(circle, LEGITIMATE_COLOR, "coverage of L"),
@@ -45,7 +53,8 @@ def fixed_on_map(scenario: Scenario, flight: Flight) -> list[Trace]:
 
 def moving_on_map(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Trace]:
     """What a slot changes, always as many traces in the same order."""
-    helper = (float(flight.path[slot + 1, 0]), float(flight.path[slot + 1, 1]))
+    x, y = flight.helper(slot + 1)
+    helper = round(x, 2), round(y, 2)
     relay = bool(flight.relay[slot])
     near = _circle(helper, scenario.coverage_radius) if relay else (_NOTHING, _NOTHING)
     return [
@@ -53,30 +62,25 @@ def moving_on_map(scenario: Scenario, flight: Flight, slot: int, color: str) -> 
         *_flown(flight, slot, color),
         *_links(scenario, flight.offloading[slot], helper, relay=relay),
         *_ues(scenario, flight, slot, helper),
-        _uav(scenario.legitimate_position, "legitimate UAV (L)", "square", LEGITIMATE_COLOR),
+        _uav(scenario.legitimate_position, LEGITIMATE_LABEL, "square", LEGITIMATE_COLOR),
         _uav(
-            scenario.eavesdropper_position, "eavesdropper (E)", "triangle-down", EAVESDROPPER_COLOR
+            scenario.eavesdropper_position, EAVESDROPPER_LABEL, "triangle-down", EAVESDROPPER_COLOR
         ),
-        _uav(helper, "helper UAV (H)", "circle-open", color),
+        _uav(helper, HELPER_LABEL, "circle-open", color),
     ]
 
 
 def _flown(flight: Flight, slot: int, color: str) -> list[Trace]:
     """The path up to the slot, as a line for each mode."""
+    coordinates: dict[bool, list[tuple[float | None, float | None]]] = {True: [], False: []}
+    path = flight.path.round(2)
+    for relay, first, last in runs_of_one_mode(flight.relay[: slot + 1]):
+        coordinates[relay] += [(None, None), *map(tuple, path[first : last + 1].tolist())]
     lines = []
-    for (name, dash), mode in zip(_PATH_DASHES.items(), (True, False), strict=True):
-        x: list[float | None] = []
-        y: list[float | None] = []
-        for own in np.flatnonzero(flight.relay[: slot + 1] == mode).tolist():
-            first, last = flight.path[own], flight.path[own + 1]
-            if x and flight.relay[own - 1] == mode:
-                x.append(last[0])
-                y.append(last[1])
-            else:
-                x += [None, first[0], last[0]]
-                y += [None, first[1], last[1]]
+    for (name, dash), flown in zip(_PATH_DASHES.items(), coordinates.values(), strict=True):
+        x, y = zip(*flown, strict=True) if flown else (_NOTHING, _NOTHING)
         style = {"color": color, "width": 2.6, "dash": dash}
-        line = _line(x or _NOTHING, y or _NOTHING, style, name, legend=True)
+        line = _line(list(x), list(y), style, name, legend=True)
         lines.append(line | {"mode": "lines+markers", "marker": {"size": 4, "color": color}})
     return lines
 

@@ -1,10 +1,12 @@
 """The player's panels: each slot's secrecy rates and energies, and the sum-rates of all slots."""
 
+from typing import Any
+
 import numpy as np
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.html.player_flight import Flight
+from hyuav.viz.data.flights import Flight, budgets
 from hyuav.viz.html.player_map import Trace, trace
 from hyuav.viz.html.style import translucent
 
@@ -20,23 +22,27 @@ def highest(flight: Flight) -> list[float]:
 
 def fixed_in_panels(flight: Flight) -> list[Trace]:
     """The sum-rates that each mode would have brought, slot by slot."""
-    slots = list(range(1, len(flight.relay) + 1))
+    slots = list(range(1, flight.num_slots + 1))
     rates = flight.rows[["relay_sum_rate", "jamming_sum_rate"]].to_numpy(float).round(4)
     return [
-        trace(
+        _panel(
+            4,
             "scatter",
             x=slots,
             y=rates[:, column].tolist(),
             name=name,
             mode="lines",
             line={"color": "#8A8A8A", "width": 1.2, "dash": dash},
-            showlegend=False,
             hovertemplate=f"slot %{{x}}: %{{y:.2f}} bps/Hz if {name}<extra></extra>",
-            xaxis="x4",
-            yaxis="y4",
         )
         for column, (name, dash) in enumerate((("relaying", "solid"), ("jamming", "6px,4px")))
     ]
+
+
+def _panel(number: int, kind: str, **values: Any) -> Trace:
+    """A trace in one of the panels, which the legend leaves out."""
+    axes = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+    return trace(kind, **values, **axes, showlegend=False)
 
 
 def moving_in_panels(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Trace]:
@@ -47,48 +53,41 @@ def moving_in_panels(scenario: Scenario, flight: Flight, slot: int, color: str) 
 def _bars(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Trace]:
     """The slot's secrecy rates, and its energies as shares of the budgets."""
     ues = [str(index + 1) for index in range(scenario.num_ues)]
-    budgets = np.array(
-        [scenario.ue_energy_budget] * len(ues)
-        + [scenario.edge_energy_budget, scenario.helper_energy_budget]
-    )
+    available = np.array(list(budgets(scenario).values()))
     spent, rates = flight.energy[slot], flight.secrecy_rate[slot].round(4)
-    shares = 100 * np.divide(spent, budgets, out=np.zeros_like(spent), where=budgets > 0)
+    shares = 100 * np.divide(spent, available, out=np.zeros_like(spent), where=available > 0)
     units = np.array([1e3] * len(ues) + [1.0, 1.0])
     told = [
         f"{unit * value:.4g} of {unit * budget:g} {'J' if unit == 1 else 'mJ'}"
-        for value, budget, unit in zip(spent, budgets, units, strict=True)
+        for value, budget, unit in zip(spent, available, units, strict=True)
     ]
     labelled = scenario.num_ues <= _LABELLED_UES
+    rate_texts = [f"{rate:.2f}" if rate else "" for rate in rates]
+    energy_texts = [_short(unit * value) for value, unit in zip(spent, units, strict=True)]
     label_style = {"textposition": "outside", "cliponaxis": False, "constraintext": "none"}
     label_style |= {"textangle": 0, "textfont": {"size": 9}}
     return [
-        trace(
+        _panel(
+            2,
             "bar",
             x=ues,
             y=rates.tolist(),
             name="secrecy rate",
             marker={"color": color},
-            showlegend=False,
-            text=[f"{rate:.2f}" if rate else "" for rate in rates] if labelled else None,
+            text=rate_texts if labelled else None,
             hovertemplate="UE %{x}: %{y:.3f} bps/Hz<extra></extra>",
-            xaxis="x2",
-            yaxis="y2",
             **label_style,
         ),
-        trace(
+        _panel(
+            3,
             "bar",
             x=[*ues, "L", "H"],
             y=shares.round(2).tolist(),
             name="energy",
             marker={"color": ["#8A8A8A"] * len(ues) + [LEGITIMATE_COLOR, color]},
-            showlegend=False,
-            text=[_short(unit * value) for value, unit in zip(spent, units, strict=True)]
-            if labelled
-            else None,
+            text=energy_texts if labelled else None,
             customdata=told,
             hovertemplate="%{x}: %{customdata}, %{y:.1f} %<extra></extra>",
-            xaxis="x3",
-            yaxis="y3",
             **label_style,
         ),
     ]
@@ -101,17 +100,17 @@ def _short(value: float) -> str:
 def _sum_rates(flight: Flight, slot: int, color: str) -> list[Trace]:
     """The secrecy sum-rates earned up to the slot, and a mark at the slot."""
     earned = flight.rows["secrecy_sum_rate"].to_numpy(float).round(4)
-    common = {"showlegend": False, "xaxis": "x4", "yaxis": "y4"}
     return [
-        trace(
+        _panel(
+            4,
             "bar",
             x=list(range(1, slot + 2)),
             y=earned[: slot + 1].tolist(),
             marker={"color": translucent(color, 0.45)},
             hovertemplate="slot %{x}: %{y:.2f} bps/Hz earned<extra></extra>",
-            **common,
         ),
-        trace(
+        _panel(
+            4,
             "scatter",
             x=[slot + 1],
             y=[float(earned[slot])],
@@ -119,6 +118,5 @@ def _sum_rates(flight: Flight, slot: int, color: str) -> list[Trace]:
             marker={"size": 11, "color": color, "line": {"color": "white", "width": 1.5}},
             hovertemplate="slot %{x}: %{y:.2f} bps/Hz earned<extra></extra>",
             cliponaxis=False,
-            **common,
         ),
     ]

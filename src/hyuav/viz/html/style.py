@@ -1,37 +1,17 @@
-"""What all figures of a report share: colors, lines, fonts, and text that stays text."""
+"""What all figures of a report share: lines, fonts, axes, and text that stays text."""
 
 import html
 from typing import Any
 
-from hyuav.experiments.schemes import LABELS, SCHEMES, Kind
-from hyuav.viz.paper import COLORS
+from hyuav.viz.data.schemes import Line
 
-OPTIMUM_COLOR = "#6B6B6B"
 GRID_COLOR = "#E6E6E6"
 INK = "#222222"
 
 FONT = {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif", "color": INK}
 
-DASHES = {"relay": "solid", "jamming": "6px,3px", "optimum": "2px,3px"}
-"""Lines of what relays, or may, of what only jams, and of optima; as in the printed figures."""
-
-
-def scheme_color(scheme: str) -> str:
-    """The scheme's color in every figure; grey for an unknown one."""
-    return COLORS.get(scheme, OPTIMUM_COLOR)
-
-
-def scheme_label(scheme: str) -> str:
-    """The scheme's name in every figure."""
-    return LABELS.get(scheme, plain(scheme))
-
-
-def scheme_dash(scheme: str) -> str:
-    """The scheme's line in every figure."""
-    known = SCHEMES.get(scheme)
-    if known is not None and known.kind is Kind.OPTIMUM:
-        return DASHES["optimum"]
-    return DASHES["jamming" if known is not None and known.mode_rule == "jamming" else "relay"]
+DASHES: dict[Line, str] = {"solid": "solid", "dashed": "6px,3px", "dotted": "2px,3px"}
+"""The lines of :func:`hyuav.viz.data.schemes.scheme_line`."""
 
 
 def plain(text: object) -> str:
@@ -70,4 +50,18 @@ def axis(title: str, **more: Any) -> dict[str, Any]:
         "ticklen": 3,
         "automargin": True,
         **more,
+    }
+
+
+def legend_below(**place: Any) -> dict[str, Any]:
+    """A legend in rows, from the left, below the plot."""
+    return {"orientation": "h", "x": 0.0, "yanchor": "top"} | place
+
+
+def square_map(half: float) -> dict[str, Any]:
+    """Both axes of a map that ends ``half`` m from its middle, with the same scale."""
+    both = {"range": [-half, half], "constrain": "domain", "nticks": 6, "mirror": True}
+    return {
+        "xaxis": axis("x (m)", **both),
+        "yaxis": axis("y (m)", **both, scaleanchor="x", scaleratio=1),
     }

@@ -1,26 +1,16 @@
 """Tables of a report as HTML, in which everything that was read from a file is escaped."""
 
-import dataclasses
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 from markupsafe import Markup, escape
 
+from hyuav._support.formatting import bounds, or_never, percent
 from hyuav.experiments.comparison.tables import label
-from hyuav.experiments.schemes import LABELS
-from hyuav.physics.scenario import Scenario
-from hyuav.viz.html.style import scheme_color
-
-_UNITS = {
-    f"scenario.{field.name}": " ".join(
-        part for part in (field.metadata["symbol"], f"({unit})" if unit else "") if part
-    )
-    for field in dataclasses.fields(Scenario)
-    for unit in [field.metadata["unit"]]
-}
-"""The symbol and unit of each parameter of the scenario."""
+from hyuav.experiments.evaluation_table import flight_cells
+from hyuav.viz.data.configuration import SYMBOLS, entries
+from hyuav.viz.data.schemes import scheme_color, scheme_label
 
 
 def html_table(
@@ -65,15 +55,8 @@ def scheme_table(summary: Mapping[str, Any]) -> Markup:
     """
     rows = [
         (
-            _swatch(scheme_color(scheme), LABELS.get(scheme, scheme)),
-            "{:.2f} [{:.2f}, {:.2f}]".format(
-                result["secrecy_sum_rate"]["mean"], *result["secrecy_sum_rate"]["ci95"]
-            ),
-            _percent(result.get("fraction_of_optimum")),
-            _percent(result.get("fraction_of_hybrid_optimum")),
-            _percent(result["relay_share"]),
-            _percent(result["offloading_share"]),
-            f"{result['off_map']:.1f}",
+            _swatch(scheme_color(scheme), scheme_label(scheme)),
+            *flight_cells(result),
             f"{1e3 * result['ue_energy']:.1f}",
             f"{result['edge_energy']:.1f}",
             f"{result['helper_energy'] / 1e3:.2f}",
@@ -108,17 +91,18 @@ def cells_table(cells: pd.DataFrame, threshold: float) -> Markup:
         (
             label(str(cell["algorithm"])),
             *(cell[name] for name in ("scenario", "scheme", "num_slots", "learners")),
-            *_shares(cell),
+            f"{100 * cell['iqm']:.1f}",
+            bounds(100 * cell["low"], 100 * cell["high"], 1),
             f"{100 * cell['worst']:.1f}",
-            _percent(cell["above_threshold"], 0),
-            _finite(cell["median_episodes_to_threshold"], ".0f"),
-            _finite(cell["median_seconds_to_threshold"], ".1f"),
+            percent(cell["above_threshold"], 0),
+            or_never(cell["median_episodes_to_threshold"], 0),
+            or_never(cell["median_seconds_to_threshold"], 1),
         )
         for _, cell in cells.iterrows()
     ]
     headings = (
         *("Algorithm", "Scenario", "Scheme", "T", "Learners", "IQM (%)", "95 % interval"),
-        *("Worst (%)", f"reach {_percent(threshold, 0)}", "Episodes until then", "Seconds (s)"),
+        *("Worst (%)", f"reach {percent(threshold, None)}", "Episodes until then", "Seconds (s)"),
     )
     caption = "Share of the optimum: interquartile mean (IQM) over the learners of each cell"
     return html_table(caption, headings, rows, text=3)
@@ -135,30 +119,19 @@ def algorithms_table(algorithms: pd.DataFrame, threshold: float) -> Markup:
         (
             label(str(row["algorithm"])),
             row["learners"],
-            *_shares(row),
+            f"{100 * row['iqm']:.1f}",
+            bounds(100 * row["low"], 100 * row["high"], 1),
             *(f"{100 * row[name]:.1f}" for name in ("median", "worst")),
-            *(_percent(row[name], 0) for name in ("near_optimal", "above_threshold")),
+            *(percent(row[name], 0) for name in ("near_optimal", "above_threshold")),
             f"{row['seconds']:.1f}",
         )
         for _, row in algorithms.iterrows()
     ]
     headings = (
         *("Algorithm", "Learners", "IQM (%)", "95 % interval", "Median (%)", "Worst (%)"),
-        *("reach 95 %", f"reach {_percent(threshold, 0)}", "Median time (s)"),
+        *("reach 95 %", f"reach {percent(threshold, None)}", "Median time (s)"),
     )
     return html_table("Share of the optimum over all cells", headings, rows)
-
-
-def _shares(row: "pd.Series[Any]") -> tuple[str, str]:
-    return f"{100 * row['iqm']:.1f}", f"[{100 * row['low']:.1f}, {100 * row['high']:.1f}]"
-
-
-def _percent(share: float | None, digits: int = 1) -> str:
-    return "-" if share is None else f"{100 * share:.{digits}f} %"
-
-
-def _finite(value: float, form: str) -> str:
-    return format(value, form) if math.isfinite(value) else "never"
 
 
 def configuration_tables(config: Mapping[str, Any]) -> Markup:
@@ -169,10 +142,10 @@ def configuration_tables(config: Mapping[str, Any]) -> Markup:
     """
     sections: dict[str, list[tuple[object, ...]]] = {}
     for name, value in config.items():
-        entries = _flat(str(name), value)
         section = str(name) if isinstance(value, Mapping) else "general"
         sections.setdefault(section, []).extend(
-            (entry, _value(content), _UNITS.get(entry, "")) for entry, content in entries
+            (entry, _value(content), SYMBOLS.get(entry, ""))
+            for entry, content in entries(value, str(name))
         )
     return Markup("").join(
         Markup("<details{}><summary>{} ({} entries)</summary>{}</details>").format(
@@ -192,13 +165,6 @@ def _with_units(
     if any(unit for _, _, unit in rows):
         return ("Parameter", "Value", "Symbol and unit"), rows
     return ("Parameter", "Value"), [row[:2] for row in rows]
-
-
-def _flat(name: str, value: object) -> list[tuple[str, object]]:
-    """Nested entries under dotted names."""
-    if isinstance(value, Mapping) and value:
-        return [pair for key, entry in value.items() for pair in _flat(f"{name}.{key}", entry)]
-    return [(name, value)]
 
 
 def _value(value: object) -> Markup:

@@ -6,7 +6,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,11 +21,10 @@ from hyuav.envs.rendering import (
     draw_flight,
     draw_scenario,
 )
-from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import Point, Scenario
-from hyuav.viz.paper.flights import path_of
-from hyuav.viz.paper.maps import MODE_COLORS
-from hyuav.viz.paper.style import COLORS, STYLE
+from hyuav.viz.data.flights import Flight
+from hyuav.viz.data.schemes import COLORS, scheme_label
+from hyuav.viz.paper.style import MODE_COLORS, STYLE
 
 INCHES, DPI = (3.5, 5.0), 140
 SLOTS_PER_SECOND, SLOTS_HELD = 2, 3
@@ -43,12 +41,12 @@ JAMMING: dict[str, Any] = {
 """The line from the helper to the eavesdropper that it jams."""
 
 
-def animate_flight(scenario: Scenario, slots: pd.DataFrame, file: Path) -> None:
+def animate_flight(scenario: Scenario, flight: Flight, file: Path) -> None:
     """Write a flight as an animated GIF: who offloads to whom, in which mode, and what it brings.
 
     Args:
         scenario: that is flown.
-        slots: of one flight, a row per slot as in :attr:`Evaluation.flights`.
+        flight: that is shown.
         file: to write.
 
     Raises:
@@ -62,38 +60,35 @@ def animate_flight(scenario: Scenario, slots: pd.DataFrame, file: Path) -> None:
         writer = PillowWriter(fps=SLOTS_PER_SECOND)
         drawn = Path(elsewhere) / file.name  # Pillow tells the format by the name
         with writer.saving(figure, str(drawn), DPI):
-            for flown in (*range(len(slots) + 1), *[len(slots)] * SLOTS_HELD):
+            for flown in (*range(flight.num_slots + 1), *[flight.num_slots] * SLOTS_HELD):
                 over_map.clear()
-                _draw_map(over_map, scenario, slots.iloc[:flown])
+                _draw_map(over_map, scenario, flight, flown)
                 over_time.clear()
-                _draw_rates(over_time, slots, flown)
+                _draw_rates(over_time, flight, flown)
                 writer.grab_frame()
         write_durably(file, drawn.read_bytes())
 
 
-def _draw_map(axes: Axes, scenario: Scenario, slots: pd.DataFrame) -> None:
+def _draw_map(axes: Axes, scenario: Scenario, flight: Flight, flown: int) -> None:
     """The flight up to now, with the links of the last of its slots."""
-    offloading = slots["offloading"].iloc[-1] if len(slots) else [False] * scenario.num_ues
+    offloading = flight.offloading[flown - 1] if flown else [False] * scenario.num_ues
     draw_scenario(axes, scenario, offloading)
-    path, relays = path_of(scenario, slots), slots["relay"].to_numpy()
-    scheme = "proposed" if not len(slots) else str(slots["scheme"].iloc[0])
-    helper = (float(path[-1, 0]), float(path[-1, 1]))
-    draw_coverage(axes, helper, scenario.coverage_radius, COLORS[scheme])
-    draw_flight(axes, path, relays, COLORS[scheme])
+    helper, color = flight.helper(flown), COLORS[flight.scheme]
+    draw_coverage(axes, helper, scenario.coverage_radius, color)
+    draw_flight(axes, flight.path[: flown + 1], flight.relay[:flown], color)
     ring: Any = {
         "marker": "o",
         "markersize": 10.0,
         "markerfacecolor": "white",
         "markeredgewidth": 1.6,
     }
-    axes.plot(*helper, color=COLORS[scheme], clip_on=False, zorder=4.5, **ring)
+    axes.plot(*helper, color=color, clip_on=False, zorder=4.5, **ring)
     _draw_letters(axes, scenario, helper)
-    title = f"slot {len(slots)} of {scenario.num_slots}"
-    if len(slots):
-        now = slots.iloc[-1]
-        mode = "relays" if now["relay"] else "jams"
-        axes.set_title(f"{LABELS[scheme]}, {title}: the helper {mode}")
-        _draw_links(axes, scenario, helper, now)
+    title = f"slot {flown} of {scenario.num_slots}"
+    if flown:
+        mode = "relays" if flight.relay[flown - 1] else "jams"
+        axes.set_title(f"{scheme_label(flight.scheme)}, {title}: the helper {mode}")
+        _draw_links(axes, scenario, flight, flown)
     else:
         axes.set_title(f"{title}: start")
 
@@ -120,29 +115,30 @@ def _draw_letters(axes: Axes, scenario: Scenario, helper: Point) -> None:
         )
 
 
-def _draw_links(axes: Axes, scenario: Scenario, helper: Point, now: pd.Series) -> None:
+def _draw_links(axes: Axes, scenario: Scenario, flight: Flight, flown: int) -> None:
     """From each UE that offloads to L and, in relay mode, by way of the helper; or the jamming."""
-    sending = np.asarray(scenario.ue_positions)[np.asarray(now["offloading"], dtype=bool)]
+    helper, relays = flight.helper(flown), flight.relay[flown - 1]
+    sending = np.asarray(scenario.ue_positions)[flight.offloading[flown - 1]]
     style: Any = {"color": LINK_COLOR, "linewidth": 0.7, "zorder": 2.2}
-    receivers = [scenario.legitimate_position, *([helper] if now["relay"] else [])]
+    receivers = [scenario.legitimate_position, *([helper] if relays else [])]
     for receiver in receivers:
         for ue in sending:
             axes.plot(*zip(ue, receiver, strict=True), **style)
-    if now["relay"] and len(sending):
+    if relays and len(sending):
         ends = (helper, scenario.legitimate_position)
         axes.plot(*zip(*ends, strict=True), **style | {"linewidth": 1.6})
-    if not now["relay"]:
+    if not relays:
         ends = (helper, scenario.eavesdropper_position)
         axes.plot(*zip(*ends, strict=True), **JAMMING, zorder=2.6)
 
 
-def _draw_rates(axes: Axes, slots: pd.DataFrame, flown: int) -> None:
+def _draw_rates(axes: Axes, flight: Flight, flown: int) -> None:
     """The secrecy sum-rate of each slot up to now."""
-    past = slots.iloc[:flown]
-    colors = [MODE_COLORS["relay" if relay else "jamming"] for relay in past["relay"]]
-    axes.bar(past["slot"], past["secrecy_sum_rate"], color=colors, width=0.8)
-    highest = max(float(slots["secrecy_sum_rate"].max()), 1.0)
-    axes.set(xlim=(0.4, len(slots) + 0.6), ylim=(0, 1.05 * highest), xlabel="Slot")
+    rates = flight.rows["secrecy_sum_rate"].to_numpy(float)
+    colors = [MODE_COLORS["relay" if relay else "jamming"] for relay in flight.relay[:flown]]
+    axes.bar(range(1, flown + 1), rates[:flown], color=colors, width=0.8)
+    highest = max(float(rates.max()), 1.0)
+    axes.set(xlim=(0.4, flight.num_slots + 0.6), ylim=(0, 1.05 * highest), xlabel="Slot")
     axes.set_ylabel("Sum-rate\n(bps/Hz)")
     axes.xaxis.set_major_locator(MaxNLocator(10, integer=True, steps=[1, 2, 5, 10]))
 

@@ -6,30 +6,26 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from hyuav.envs.rendering import OKABE_ITO
-from hyuav.experiments.comparison.plan import ENTRIES, PIECES, Compare
-from hyuav.experiments.comparison.statistics import learning_curves, performance_profiles
+from hyuav._support.formatting import percent
+from hyuav.experiments.comparison.plan import Compare
+from hyuav.experiments.comparison.statistics import learning_curves
 from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.comparison.tables import MOST_COLUMNS, label
-from hyuav.learning.registry import PEER
-from hyuav.viz.paper import COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
-
-_OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
-
-COLORS = {name: OKABE_ITO[_OTHERS[i % len(_OTHERS)]] for i, name in enumerate(ENTRIES)} | {
-    PEER: OKABE_ITO["vermillion"]
-}
-"""The same color for an algorithm in every figure."""
-
-_UNKNOWN = "#777777"
-"""Of an algorithm or a piece that is not offered now: another user's own, an earlier version's."""
+from hyuav.viz.data.comparison import entry_color, entry_line, profiles
+from hyuav.viz.paper.style import (
+    COLUMN_WIDTH,
+    LINES,
+    PAGE_WIDTH,
+    STYLE,
+    legend_below,
+    save_figure,
+)
 
 _DASHES: Sequence[Any] = (
     "solid",
@@ -41,20 +37,6 @@ _MARKERS = "os^Dv"
 FRACTION = "Fraction of the optimum"
 
 
-def color(entry: str) -> str:
-    """An entry's color; a variant without a piece has that of the piece."""
-    piece = entry.partition("-")[2]
-    if piece in PIECES:
-        return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]]
-    return _UNKNOWN if piece else COLORS.get(entry, _UNKNOWN)
-
-
-def dash(entry: str) -> int:
-    """Which line and marker tell an entry from others of its color; 0 of a whole algorithm."""
-    piece = entry.partition("-")[2]
-    return 1 + PIECES.index(piece) // len(_OTHERS) if piece in PIECES else 0
-
-
 def draw(summary: Summary, options: Compare, directory: Path) -> None:
     """Write the figures as PNG and PDF, and as CSV what they show.
 
@@ -63,16 +45,15 @@ def draw(summary: Summary, options: Compare, directory: Path) -> None:
         options: with the threshold.
         directory: for the files.
     """
-    results, threshold = summary.results, options.threshold
+    threshold = options.threshold
     save_figure(cell_means(summary.cells), directory, "cells", {"": summary.cells})
     curves = learning_curves(summary.curves)
     if len(curves):
         figure = curves_figure(curves, threshold)
         save_figure(figure, directory, "learning_curves", {"": curves})
-    lowest = max(math.floor(20 * results["fraction"].min()) / 20, 0.0)
-    profiles = performance_profiles(results, np.linspace(min(lowest, 0.95), 1.0, 101))
-    figure = profiles_figure(profiles, threshold)
-    save_figure(figure, directory, "performance_profiles", {"": profiles})
+    reached = profiles(summary.results)
+    figure = profiles_figure(reached, threshold)
+    save_figure(figure, directory, "performance_profiles", {"": reached})
     if len(summary.improvements):
         figure, table = improvement_bars(summary.improvements), summary.improvements
         save_figure(figure, directory, "improvement", {"": table})
@@ -116,25 +97,25 @@ def _draw_cells(
         name = cell["algorithm"]
         offset = (algorithms.index(name) - (len(algorithms) - 1) / 2) * step
         y = schemes.index(cell["scheme"]) + offset
-        axes.plot([cell["low"], cell["high"]], [y, y], color=color(str(name)), linewidth=1.4)
-        axes.plot(cell["iqm"], y, _MARKERS[dash(str(name))], color=color(str(name)))
-        axes.plot(cell["worst"], y, "|", color=color(str(name)), markersize=6.0)
+        axes.plot([cell["low"], cell["high"]], [y, y], color=entry_color(str(name)), linewidth=1.4)
+        axes.plot(cell["iqm"], y, _MARKERS[entry_line(str(name))], color=entry_color(str(name)))
+        axes.plot(cell["worst"], y, "|", color=entry_color(str(name)), markersize=6.0)
     axes.set_yticks(range(len(schemes)), schemes)
     axes.set_ylim(len(schemes) - 0.5, -0.5)
     axes.xaxis.set_major_formatter(_percent)
     axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     for boundary in range(1, len(schemes)):
         axes.axhline(boundary - 0.5, color="0.85", linewidth=0.5)
-    axes.grid(color="0.92", linewidth=0.5, axis="x")
+    axes.grid(axis="x")
 
 
 def _percent(value: float, _: float) -> str:
-    return f"{100 * value:g} %"
+    return percent(value, None)
 
 
 def _handle(algorithm: str) -> Line2D:
-    marker = _MARKERS[dash(algorithm)]
-    return Line2D([], [], color=color(algorithm), marker=marker, label=label(algorithm))
+    marker = _MARKERS[entry_line(algorithm)]
+    return Line2D([], [], color=entry_color(algorithm), marker=marker, label=label(algorithm))
 
 
 def _add_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
@@ -143,13 +124,7 @@ def _add_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
     column = 0.45 + 0.05 * max(len(str(handle.get_label())) for handle in handles)
     columns = min(max(int(width / column), 1), len(handles))
     figure.set_size_inches(width, height + 0.15 * math.ceil(len(handles) / columns))
-    figure.legend(
-        handles=list(handles),
-        loc="outside lower center",
-        ncols=columns,
-        frameon=False,
-        columnspacing=1.2,
-    )
+    legend_below(figure, handles, columns, 1.2)
 
 
 def curves_figure(curves: pd.DataFrame, threshold: float) -> Figure:
@@ -160,13 +135,10 @@ def curves_figure(curves: pd.DataFrame, threshold: float) -> Figure:
         threshold: share of the optimum, drawn as a line.
     """
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
-        axes = figure.add_subplot()
-        handles = _draw_bands(axes, curves, "episode", "iqm")
-        axes.axhline(threshold, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
+        figure, axes = _bands(curves, "episode", "iqm")
+        axes.axhline(threshold, color="0.3", linewidth=0.9, linestyle=LINES["dotted"])
         axes.set(xlabel="Training episodes", ylabel=f"{FRACTION} (IQM)")
         axes.yaxis.set_major_formatter(_percent)
-        _add_legend(figure, handles)
         return figure
 
 
@@ -178,35 +150,34 @@ def profiles_figure(profiles: pd.DataFrame, threshold: float) -> Figure:
         threshold: share of the optimum, drawn as a line.
     """
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
-        axes = figure.add_subplot()
-        handles = _draw_bands(axes, profiles, "fraction", "share")
-        axes.axvline(threshold, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
+        figure, axes = _bands(profiles, "fraction", "share")
+        axes.axvline(threshold, color="0.3", linewidth=0.9, linestyle=LINES["dotted"])
         axes.set(xlabel=f"{FRACTION}, $\\tau$", ylabel="Learners that reach $\\tau$ or more")
         axes.set_ylim(-0.02, 1.04)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(_percent)
-        _add_legend(figure, handles)
         return figure
 
 
-def _draw_bands(axes: Axes, rows: pd.DataFrame, x: str, y: str) -> list[Line2D]:
-    """The lines with their bands; returned are the lines."""
-    lines = []
+def _bands(rows: pd.DataFrame, x: str, y: str) -> tuple[Figure, Axes]:
+    """A line with its band for each algorithm."""
+    figure = Figure(figsize=(COLUMN_WIDTH, 2.6), layout="constrained")
+    axes, lines = figure.add_subplot(), []
     for name, own in rows.groupby("algorithm", sort=False):
-        hue = color(str(name))
+        hue = entry_color(str(name))
         axes.fill_between(own[x], own["low"], own["high"], color=hue, alpha=0.15, linewidth=0)
         lines += axes.plot(
             own[x],
             own[y],
             color=hue,
-            linestyle=_DASHES[dash(str(name))],
+            linestyle=_DASHES[entry_line(str(name))],
             linewidth=1.3,
             label=label(str(name)),
         )
     axes.margins(x=0.0)
-    axes.grid(color="0.92", linewidth=0.5)
-    return lines
+    axes.grid()
+    _add_legend(figure, lines)
+    return figure, axes
 
 
 def improvement_bars(improvements: pd.DataFrame) -> Figure:
@@ -229,19 +200,19 @@ def improvement_bars(improvements: pd.DataFrame) -> Figure:
         axes = figure.add_subplot()
         places = range(len(pairs))
         for place, (_, pair) in zip(places, pairs.iterrows(), strict=True):
-            hue = color(pair["algorithm"])
+            hue = entry_color(pair["algorithm"])
             axes.barh(place, pair["high"] - pair["low"], 0.6, pair["low"], color=hue, alpha=0.35)
             axes.plot(
                 [pair["probability"]] * 2, [place - 0.3, place + 0.3], color=hue, linewidth=1.8
             )
-        axes.axvline(0.5, color="0.3", linewidth=0.9, linestyle=(0, (1, 1.5)))
+        axes.axvline(0.5, color="0.3", linewidth=0.9, linestyle=LINES["dotted"])
         axes.set_yticks(places, [label(name) for name in pairs["other" if alone else "algorithm"]])
         axes.set_ylim(len(pairs) - 0.4, -0.6)
         axes.set_xlim(-0.02, 1.02)
         better = label(names[0]) if alone else "left"
         axes.set_xlabel(f"P({better} better than {'the other' if alone else 'right'})")
         axes.xaxis.set_major_formatter(_percent)
-        axes.grid(color="0.92", linewidth=0.5, axis="x")
+        axes.grid(axis="x")
         axes.set_axisbelow(True)
         if not alone:
             right = axes.secondary_yaxis("right")

@@ -1,59 +1,18 @@
 """Accumulated reward against episodes: the paper's Fig. 2."""
 
-from collections.abc import Mapping
-
 import matplotlib as mpl
-import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from hyuav.experiments.intervals import interquartile_mean, stratified_interval
-from hyuav.experiments.schemes import LABELS
-from hyuav.viz.paper.style import COLORS, COLUMN_WIDTH, DOTTED, LINES, STYLE
-
-SMOOTHING = 25
-"""Episodes over which each learner's reward is averaged, the last ones up to each episode."""
+from hyuav.viz.data.schemes import COLORS, scheme_label, scheme_line
+from hyuav.viz.paper.style import COLUMN_WIDTH, LINES, STYLE, legend_below
 
 
-def learning_table(
-    rewards: Mapping[str, pd.DataFrame], optima: Mapping[str, float], training: str = ""
-) -> pd.DataFrame:
-    """The interquartile mean of what the learners of each scheme earn, episode by episode.
-
-    Args:
-        rewards: by scheme, a column per learner and a row per episode, in bps/Hz.
-        optima: by scheme, what the best flight earns on average, in bps/Hz.
-        training: what the training is called.
-
-    Returns:
-        ``training``, ``scheme``, ``episode``, ``learners``; in bps/Hz the ``iqm`` of the
-        rewards, each averaged over :data:`SMOOTHING` episodes, its 95 % bootstrap interval
-        ``low`` to ``high``, and the ``optimum``, NaN where it is not known.
-    """
-    tables = []
-    for scheme in (name for name in LABELS if name in rewards):
-        smooth = rewards[scheme].rolling(SMOOTHING, min_periods=1).mean()
-        samples = smooth.to_numpy(dtype=np.float64)
-        low, high = stratified_interval([samples], interquartile_mean)
-        columns = {
-            "training": training,
-            "scheme": scheme,
-            "episode": smooth.index,
-            "learners": smooth.shape[1],
-            "iqm": interquartile_mean([samples]),
-            "low": low,
-            "high": high,
-            "optimum": optima.get(scheme, np.nan),
-        }
-        tables.append(pd.DataFrame(columns))
-    return pd.concat(tables, ignore_index=True)
-
-
-def learning_curves(table: pd.DataFrame) -> Figure:
+def learning_figure(table: pd.DataFrame) -> Figure:
     """Accumulated reward against episodes, with bands, and the optimum of each scheme as a line.
 
     Args:
-        table: of :func:`learning_table`, of one training or several, each of which has a panel.
+        table: of :func:`.learning_table`, of one training or several, each of which has a panel.
     """
     trainings = list(dict.fromkeys(table["training"]))
     with mpl.rc_context(STYLE):
@@ -64,19 +23,21 @@ def learning_curves(table: pd.DataFrame) -> Figure:
             for name, curve in table[table["training"] == training].groupby("scheme", sort=False):
                 scheme = str(name)
                 color, episodes = COLORS[scheme], curve["episode"]
-                axes.axhline(curve["optimum"].iloc[0], color=color, linewidth=0.9, linestyle=DOTTED)
+                optimum = curve["optimum"].iloc[0]
+                axes.axhline(optimum, color=color, linewidth=0.9, linestyle=LINES["dotted"])
                 axes.fill_between(
                     episodes, curve["low"], curve["high"], color=color, alpha=0.2, linewidth=0
                 )
-                label, line = LABELS[scheme], LINES[scheme]
+                label, line = scheme_label(scheme), LINES[scheme_line(scheme)]
                 axes.plot(episodes, curve["iqm"], color=color, ls=line, lw=1.2, label=label)
             axes.set_title(training)
             axes.margins(x=0.0)
-            axes.grid(color="0.92", linewidth=0.5)
+            axes.grid()
             axes.set_axisbelow(True)
-        panels[-1].plot([], [], color="0.3", linewidth=0.9, linestyle=DOTTED, label="its optimum")
+        dotted = LINES["dotted"]
+        panels[-1].plot([], [], color="0.3", linewidth=0.9, linestyle=dotted, label="its optimum")
         panels[-1].set_xlabel("Episode")
         handles, _ = panels[-1].get_legend_handles_labels()
-        figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+        legend_below(figure, handles, 4, 2.0)
         figure.supylabel("Accumulated reward (bps/Hz)", fontsize=8)
         return figure

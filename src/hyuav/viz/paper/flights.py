@@ -1,25 +1,28 @@
 """Flights over the map: the paper's Fig. 3, and every scheme over its own optimum."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR, draw_flight, draw_scenario, mode_handles
 from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.paper.style import COLORS, COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
+from hyuav.viz.data.flights import Flight, first_flights, flight_tables
+from hyuav.viz.data.schemes import COLORS
+from hyuav.viz.paper.style import COLUMN_WIDTH, PAGE_WIDTH, STYLE, legend_below, save_figure
 
 FLOWN_BY_LEARNING = {"ja_ot": 2.4, "re_ot": 1.7, "proposed": 1.0}
 """Fig. 3's schemes from below, and how broadly each is drawn: none hides where they coincide."""
+
+TRAJECTORIES = (*FLOWN_BY_LEARNING, "optimum")
+"""What Fig. 3 shows."""
 
 FLIGHT_PANELS = {
     "optimum": ["proposed"],
@@ -28,17 +31,9 @@ FLIGHT_PANELS = {
 }
 """The maps of the flight figure: the optimum underneath, and the schemes flown over it."""
 
+_PANELS_SCHEMES = [name for optimum, over in FLIGHT_PANELS.items() for name in (optimum, *over)]
+
 OPTIMUM_COLOR, OPTIMUM_WIDTH = "0.78", 5.0
-
-
-def first_flight(flights: pd.DataFrame, scheme: str) -> pd.DataFrame:
-    """The slots of a scheme's first episode, none where it was not flown."""
-    return flights[(flights["scheme"] == scheme) & (flights["episode"] == 0)]
-
-
-def path_of(scenario: Scenario, slots: pd.DataFrame) -> NDArray[np.float64]:
-    """The start and the position in each slot: (T + 1, 2) m."""
-    return np.vstack([scenario.helper_start, slots[["x", "y"]].to_numpy()])
 
 
 def trajectories(scenario: Scenario, flights: pd.DataFrame) -> Figure:
@@ -50,32 +45,22 @@ def trajectories(scenario: Scenario, flights: pd.DataFrame) -> Figure:
         scenario: that was flown.
         flights: a row per slot, as in :attr:`Evaluation.flights`; each scheme's first is drawn.
     """
+    flown = first_flights(scenario, flights, TRAJECTORIES)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(COLUMN_WIDTH, 3.95), layout="constrained")
         axes = figure.add_subplot()
         draw_scenario(axes, scenario)
-        _draw_optimum(axes, scenario, flights, "optimum")
+        _draw_optimum(axes, flown, "optimum")
         for scheme, breadth in FLOWN_BY_LEARNING.items():
             wider: Any = {"lines.linewidth": breadth, "lines.markersize": 2.6 + breadth}
             with mpl.rc_context(wider):
-                _draw_scheme(axes, scenario, flights, scheme)
+                _draw_scheme(axes, flown, scheme)
         handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
         lines = [LABELS[name] for name in (*reversed(FLOWN_BY_LEARNING), "optimum")]
-        flown = [handles.pop(label) for label in lines if label in handles]
-        figure.legend(
-            handles=[
-                *handles.values(),
-                _coverage_handle(),
-                *flown,
-                *mode_handles(),
-                *_end_handles(),
-            ],
-            loc="outside lower center",
-            ncols=3,
-            frameon=False,
-            columnspacing=1.0,
-            handletextpad=0.6,
-        )
+        drawn = [handles.pop(label) for label in lines if label in handles]
+        nodes = [*handles.values(), _coverage_handle()]
+        samples = [*mode_handles(), *_end_handles()]
+        legend_below(figure, [*nodes, *drawn, *samples], 3, handletextpad=0.6)
         return figure
 
 
@@ -88,14 +73,15 @@ def flight_map(scenario: Scenario, flights: pd.DataFrame) -> Figure:
         scenario: that was flown.
         flights: a row per slot, as in :attr:`Evaluation.flights`; each scheme's first is drawn.
     """
+    flown = first_flights(scenario, flights, _PANELS_SCHEMES)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(PAGE_WIDTH, 3.05), layout="constrained")
         row: list[Axes] = list(figure.subplots(1, len(FLIGHT_PANELS), sharey=True))
         for axes, (optimum, schemes) in zip(row, FLIGHT_PANELS.items(), strict=True):
             draw_scenario(axes, scenario)
-            _draw_optimum(axes, scenario, flights, optimum)
+            _draw_optimum(axes, flown, optimum)
             for scheme in schemes:
-                _draw_scheme(axes, scenario, flights, scheme)
+                _draw_scheme(axes, flown, scheme)
             axes.set_title(" and ".join(LABELS[scheme] for scheme in schemes))
             axes.label_outer()
         handles = {
@@ -103,13 +89,8 @@ def flight_map(scenario: Scenario, flights: pd.DataFrame) -> Figure:
             for axes in row
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
         }
-        figure.legend(
-            handles=[*handles.values(), _coverage_handle(), *mode_handles(), *_end_handles()],
-            loc="outside lower center",
-            ncols=5,
-            frameon=False,
-            columnspacing=1.4,
-        )
+        samples = [_coverage_handle(), *mode_handles(), *_end_handles()]
+        legend_below(figure, [*handles.values(), *samples], 5, 1.4)
         return figure
 
 
@@ -124,47 +105,14 @@ def save_flight_map(
         directory: for the files.
         name: of the figure.
     """
-    schemes = [scheme for optimum, over in FLIGHT_PANELS.items() for scheme in (optimum, *over)]
-    tables = flight_tables(scenario, flights, schemes)
+    tables = flight_tables(scenario, flights, _PANELS_SCHEMES)
     save_figure(flight_map(scenario, flights), directory, name, tables)
 
 
-def flight_tables(
-    scenario: Scenario, flights: pd.DataFrame, schemes: Sequence[str]
-) -> dict[str, pd.DataFrame]:
-    """What a map of flights shows.
-
-    Args:
-        scenario: that was flown.
-        flights: a row per slot; each scheme's first is taken.
-        schemes: that are drawn.
-
-    Returns:
-        "", the flights: ``scheme``, ``slot`` (0 is the start), ``x`` and ``y`` in m, and whether
-        the helper does ``relay``; "nodes": each ``node`` with its ``x`` and ``y`` in m and the
-        ``coverage`` radius in m of L.
-    """
-    paths = []
-    for scheme in schemes:
-        slots = first_flight(flights, scheme)
-        if len(slots):
-            path = path_of(scenario, slots)
-            relay: list[bool | None] = [None, *slots["relay"]]
-            columns = {"slot": range(len(path)), "x": path[:, 0], "y": path[:, 1], "relay": relay}
-            paths.append(pd.DataFrame({"scheme": scheme, **columns}))
-    places = {f"UE {u}": place for u, place in enumerate(scenario.ue_positions, start=1)}
-    places |= {"L": scenario.legitimate_position, "E": scenario.eavesdropper_position}
-    nodes = pd.DataFrame([(name, *place) for name, place in places.items()])
-    nodes.columns = pd.Index(["node", "x", "y"])
-    nodes["coverage"] = [scenario.coverage_radius if name == "L" else np.nan for name in places]
-    return {"": pd.concat(paths, ignore_index=True), "nodes": nodes}
-
-
-def _draw_optimum(axes: Axes, scenario: Scenario, flights: pd.DataFrame, optimum: str) -> None:
-    best = first_flight(flights, optimum)
-    if len(best):
+def _draw_optimum(axes: Axes, flown: Mapping[str, Flight], optimum: str) -> None:
+    if optimum in flown:
         axes.plot(
-            *path_of(scenario, best).T,
+            *flown[optimum].path.T,
             color=OPTIMUM_COLOR,
             linewidth=OPTIMUM_WIDTH,
             zorder=1.5,
@@ -172,11 +120,10 @@ def _draw_optimum(axes: Axes, scenario: Scenario, flights: pd.DataFrame, optimum
         )
 
 
-def _draw_scheme(axes: Axes, scenario: Scenario, flights: pd.DataFrame, scheme: str) -> None:
-    slots = first_flight(flights, scheme)
-    if len(slots):
-        path = path_of(scenario, slots)
-        draw_flight(axes, path, slots["relay"], COLORS[scheme], LABELS[scheme])
+def _draw_scheme(axes: Axes, flown: Mapping[str, Flight], scheme: str) -> None:
+    if scheme in flown:
+        flight = flown[scheme]
+        draw_flight(axes, flight.path, flight.relay, COLORS[scheme], LABELS[scheme])
 
 
 def _coverage_handle() -> Patch:

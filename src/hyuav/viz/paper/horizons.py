@@ -1,8 +1,5 @@
 """Secrecy sum-rate against the time horizon: the paper's Fig. 4."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
-
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
@@ -10,46 +7,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hyuav.experiments.schemes import LABELS, OPTIMA
-from hyuav.viz.paper.style import COLORS, COLUMN_WIDTH, COMPARED, DOTTED, LINES, STYLE
+from hyuav.viz.data.schemes import COLORS, COMPARED, scheme_line
+from hyuav.viz.paper.style import COLUMN_WIDTH, LINES, STYLE, legend_below
 
 MARKERS = {"proposed": "o", "ja_ot": "s", "re_ot": "^", "re_lt": "v", "ja_lt": "D"}
-
-
-def horizon_table(summaries: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
-    """What each scheme and optimum earns over each horizon.
-
-    Args:
-        summaries: of evaluations, as :attr:`Evaluation.summary`, one for each horizon.
-
-    Returns:
-        ``scheme``, ``num_slots``, ``learners``, ``episodes``; in bps/Hz the ``mean`` of the secrecy
-        sum-rate and its 95 % interval ``low`` to ``high``.
-    """
-    rows = []
-    for summary in sorted(summaries, key=lambda summary: int(summary["num_slots"])):
-        for scheme in (*COMPARED, *OPTIMA.values()):
-            if scheme in summary["schemes"]:
-                result = summary["schemes"][scheme]
-                rate = result["secrecy_sum_rate"]
-                rows.append(
-                    {
-                        "scheme": scheme,
-                        "num_slots": summary["num_slots"],
-                        "learners": result["learners"],
-                        "episodes": summary["episodes"],
-                        "mean": rate["mean"],
-                        "low": rate["ci95"][0],
-                        "high": rate["ci95"][1],
-                    }
-                )
-    return pd.DataFrame(rows)
 
 
 def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
     """Secrecy sum-rate against the horizon, for the schemes and the optimum of each mode rule.
 
     Args:
-        table: of :func:`horizon_table`.
+        table: of :func:`.horizon_table`.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(COLUMN_WIDTH, 3.0), layout="constrained")
@@ -65,7 +33,7 @@ def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
                 rows["mean"],
                 yerr=[rows["mean"] - rows["low"], rows["high"] - rows["mean"]],
                 color=COLORS[scheme],
-                linestyle=LINES[scheme] if learned else DOTTED,
+                linestyle=LINES[scheme_line(scheme)],
                 marker=MARKERS.get(scheme, ""),
                 capsize=2.0 if learned else 1.0,
                 elinewidth=0.8,
@@ -73,19 +41,13 @@ def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
             )
             if learned:
                 handles.append(bars)
-        optimum = Line2D([], [], color="0.3", linestyle=DOTTED, label="its optimum")
+        optimum = Line2D([], [], color="0.3", linestyle=LINES["dotted"], label="its optimum")
         axes.set_xticks(sorted(set(table["num_slots"])))
         axes.set(xlabel="Time horizon (slots)", ylabel="Secrecy sum-rate (bps/Hz)")
         axes.set_ylim(0.0, 1.08 * table["mean"].max())  # few learners may have wider intervals
-        axes.grid(color="0.92", linewidth=0.5)
+        axes.grid()
         axes.set_axisbelow(True)
-        figure.legend(
-            handles=[*handles, optimum],
-            loc="outside lower center",
-            ncols=3,
-            frameon=False,
-            columnspacing=1.2,
-        )
+        legend_below(figure, [*handles, optimum], 3, 1.2)
         return figure
 
 

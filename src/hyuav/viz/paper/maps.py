@@ -8,40 +8,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from hyuav.envs.rendering import OKABE_ITO, draw_scenario
+from hyuav.envs.rendering import draw_scenario
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.data.maps import sum_rates_over_map
-from hyuav.viz.paper.style import COLUMN_WIDTH, STYLE
-
-MODE_COLORS = {
-    "neither": "0.88",
-    "jamming": OKABE_ITO["reddish purple"],
-    "relay": OKABE_ITO["yellow"],
-}
-"""Where no mode earns anything, and the modes, in the order of the map's values.
-
-None is the color of a scheme or of a node.
-"""
-
-
-def sum_rate_table(scenario: Scenario, resolution: float = 1.0) -> pd.DataFrame:
-    """The secrecy sum-rate at every helper position.
-
-    Without fading; where the UEs can fill the edge server, with tasks of mean size.
-
-    Args:
-        scenario: whose map it is.
-        resolution: of the map in m.
-
-    Returns:
-        row by row from the south-west, ``x`` and ``y`` in m, and in bps/Hz the sum-rates in
-        ``relay`` and in ``jamming``, and the ``better`` of both.
-    """
-    over = sum_rates_over_map(scenario, resolution)
-    x, y = np.meshgrid(over.axis, over.axis)
-    rates = {"relay": over.relay, "jamming": over.jamming, "better": over.better}
-    columns = {"x": x, "y": y, **rates}
-    return pd.DataFrame({name: values.ravel() for name, values in columns.items()})
+from hyuav.viz.paper.style import COLUMN_WIDTH, MODE_COLORS, STYLE, legend_below
 
 
 def sum_rate_maps(scenario: Scenario, table: pd.DataFrame) -> Figure:
@@ -49,7 +18,7 @@ def sum_rate_maps(scenario: Scenario, table: pd.DataFrame) -> Figure:
 
     Args:
         scenario: whose map is drawn.
-        table: of :func:`sum_rate_table`.
+        table: of :meth:`.HelperMap.table`.
     """
     half, side = scenario.map_side / 2, round(len(table) ** 0.5)
     relay, jamming, better = (
@@ -77,11 +46,5 @@ def sum_rate_maps(scenario: Scenario, table: pd.DataFrame) -> Figure:
         panels[3].imshow(chosen, origin="lower", extent=extent, cmap=colors, vmin=-0.5, vmax=2.5)
         nodes, _ = panels[0].get_legend_handles_labels()
         modes = [Patch(facecolor=color, label=mode) for mode, color in MODE_COLORS.items()]
-        figure.legend(
-            handles=[*nodes, *modes],
-            loc="outside lower center",
-            ncols=3,
-            frameon=False,
-            columnspacing=1.0,
-        )
+        legend_below(figure, [*nodes, *modes], 3)
         return figure

@@ -1,7 +1,7 @@
-"""What all figures have in common: sizes, fonts, each scheme's color and line, and their files."""
+"""What all figures have in common: sizes, fonts, lines, grid and legend, and their files."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,40 +11,29 @@ from matplotlib.figure import Figure
 
 from hyuav._support.files import write_durably
 from hyuav.envs.rendering import OKABE_ITO
+from hyuav.viz.data.schemes import Line
 
 COLUMN_WIDTH, PAGE_WIDTH = 3.5, 7.16
 """Inches of one column and of both columns of an IEEE page."""
 
-COMPARED = ("proposed", "ja_ot", "re_ot", "re_lt", "ja_lt")
-"""The five schemes of the paper."""
+LINES: dict[Line, Any] = {"solid": "solid", "dashed": (0, (4, 1.5)), "dotted": (0, (1, 1.5))}
+"""The lines of :func:`hyuav.viz.data.schemes.scheme_line`."""
 
-COLORS = {
-    "proposed": OKABE_ITO["bluish green"],
-    "ja_ot": OKABE_ITO["vermillion"],
-    "re_ot": OKABE_ITO["blue"],
-    "re_lt": OKABE_ITO["sky blue"],
-    "ja_lt": OKABE_ITO["orange"],
+MODE_COLORS = {
+    "neither": "0.88",
+    "jamming": OKABE_ITO["reddish purple"],
+    "relay": OKABE_ITO["yellow"],
 }
-"""The same color for a scheme in every figure."""
+"""Where no mode earns anything, and the modes, in the order of the map's values.
 
-COLORS |= {f"{scheme}_paper": COLORS[scheme] for scheme in ("proposed", "ja_ot", "re_ot")}
-COLORS |= {
-    "optimum": COLORS["proposed"],
-    "ja_optimum": COLORS["ja_ot"],
-    "re_optimum": COLORS["re_ot"],
-}
-
-LINES: dict[str, Any] = {
-    scheme: (0, (4, 1.5)) if scheme.startswith("ja_") else "solid" for scheme in COMPARED
-}
-"""Solid for a scheme that relays, dashed for one that only jams."""
-
-DOTTED: Any = (0, (1, 1.5))
-"""The line of every optimum."""
+None is the color of a scheme or of a node.
+"""
 
 STYLE: Any = {
     "font.size": 8,
     "axes.linewidth": 0.6,
+    "grid.color": "0.92",
+    "grid.linewidth": 0.5,
     "lines.linewidth": 1.0,
     "lines.markersize": 3.5,
     "axes.labelsize": 8,
@@ -55,6 +44,20 @@ STYLE: Any = {
     "pdf.fonttype": 42,  # fonts that journals' submission checks accept
     "savefig.dpi": 300,
 }
+
+
+def legend_below(
+    figure: Figure, handles: Sequence[Any], columns: int, spacing: float = 1.0, **more: Any
+) -> None:
+    """Place the legend below all axes, in so many columns that are ``spacing`` letters apart."""
+    figure.legend(
+        handles=list(handles),
+        loc="outside lower center",
+        ncols=columns,
+        frameon=False,
+        columnspacing=spacing,
+        **more,
+    )
 
 
 def save_figure(

@@ -1,7 +1,5 @@
 """The runs below a directory: found, summarised and read, though some are still being written."""
 
-import json
-import math
 import os
 import threading
 from collections import OrderedDict
@@ -11,14 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import yaml
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import YAML_LOADER, require_plain_yaml
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.experiments.metrics import GrowingMetrics, last_metrics
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.experiments.schemes import OPTIMA
+from hyuav.viz.data.reading import optima_of, read_evaluation, readable_config
 
 RUNNING_SECONDS = 120.0
 """A training that wrote nothing for longer counts as stopped."""
@@ -30,8 +26,8 @@ _DEEPEST = 6
 
 _WITHOUT_RUNS = {"checkpoints", "figures", "wandb", "optima"}
 
-_LARGEST_CONFIG = 2**20
-"""Bytes; no training writes a longer ``config.yaml``."""
+_LONGEST_HEADER = 2**20
+"""Bytes; no training writes a longer first line of ``metrics.csv``."""
 
 _ROW_BYTES = 250
 """Of the longest rows of ``metrics.csv``."""
@@ -129,7 +125,8 @@ class RunIndex:
         if known is not None and known[0] == stamp:
             return known
         written = states[0].st_mtime, states[-1].st_mtime
-        return stamp, _summarize(name, _read_config(files[0]), files[1], written)
+        config = {} if files[0].is_symlink() else readable_config(directory)
+        return stamp, _summarize(name, config, files[1], written)
 
     def file(self, name: str, *parts: str) -> Path:
         """A file of a run.
@@ -176,41 +173,26 @@ class RunIndex:
         Raises:
             InputError: it does not lie below the root.
         """
-        return _read_config(self.file(name, "config.yaml"))
+        return readable_config(self.file(name, "config.yaml").parent)
 
     def evaluation(self, name: str) -> Mapping[str, Any] | None:
-        """What stands in a run's ``evaluation.json``, unchecked; None where there is none.
+        """What stands in a run's ``evaluation.json``; None where there is none.
 
         Raises:
-            InputError: it is no such file.
+            InputError: it is damaged or another program's.
         """
         if not self.has(name, EVALUATION_FILE):
             return None
-        path = self.file(name, EVALUATION_FILE)
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError):
-            content = None
-        if not isinstance(content, dict):
-            raise InputError(rejection("evaluation", str(path), "what an evaluation wrote"))
-        return content
+        return read_evaluation(self.file(name, EVALUATION_FILE).parent)
 
     def optima(self, name: str) -> dict[str, float]:
-        """What the best flight earns in bps/Hz by who chooses the mode, where it was evaluated.
+        """What the best flight earns in bps/Hz by mode rule, where it was evaluated.
 
         Raises:
             InputError: as :meth:`evaluation`.
         """
-        content: Any = self.evaluation(name)
-        found = {}
-        for rule, scheme in OPTIMA.items():
-            try:
-                mean = float(content["schemes"][scheme]["secrecy_sum_rate"]["mean"])
-            except (KeyError, TypeError, ValueError, OverflowError, IndexError):
-                continue
-            if math.isfinite(mean):
-                found[rule] = mean
-        return found
+        evaluation = self.evaluation(name)
+        return {} if evaluation is None else optima_of(evaluation)
 
     def metrics(self, name: str) -> pd.DataFrame:
         """A run's metrics as far as they are written.
@@ -246,17 +228,6 @@ def _directories(
         hidden = member.name.startswith(".") or member.name in _WITHOUT_RUNS
         if not hidden and member.is_dir(follow_symlinks=False):
             yield from _directories(directory / member.name, names, depth + 1)
-
-
-def _read_config(path: Path) -> Mapping[str, Any]:
-    """The configuration as plain values; nothing where it cannot be read."""
-    try:
-        if path.is_symlink() or path.stat().st_size > _LARGEST_CONFIG:
-            return {}
-        values = yaml.load(require_plain_yaml(path), YAML_LOADER)
-    except (OSError, yaml.YAMLError, ValueError, RecursionError):
-        return {}
-    return values if isinstance(values, dict) else {}
 
 
 def _summarize(

@@ -1,5 +1,6 @@
-"""The optimum and trained checkpoints in a scenario that a person is changing."""
+"""Flights that nobody has evaluated: of trained weights, and of the optimum beside them."""
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -8,17 +9,22 @@ from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
-from hyuav.experiments.policies import learned_policy
+from hyuav.experiments.policies import learned_policies, learned_policy, straight_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
-from hyuav.experiments.schemes import LEARNED, OPTIMA
+from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.cohort import Learner
 from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve
-from hyuav.viz.dashboard.index import RunIndex, Stamp
+from hyuav.viz.data.index import RunIndex, Stamp
 
 MOST_SLOTS, MOST_UES = 500, 200
 """Of a scenario that is flown while a person waits."""
+
+QUICK = EvaluationParameters(episodes=100, flights=1)
+"""How runs are flown that nobody has evaluated."""
+
+_FEW = EvaluationParameters(episodes=2, flights=1)
 
 EPISODES = EvaluationParameters(episodes=200, flights=3)
 """Flown of each scheme, and how many of them are shown."""
@@ -62,18 +68,18 @@ def learner_label(learner: Learner, scenario: Scenario) -> str:
 def resolution(scenario: Scenario, *, fine: bool) -> float:
     """The grid spacing in m with which the optimum is found.
 
-    The coarse one is a whole fraction of the longest way along an axis in a slot.
+    The coarse one is a whole fraction of the longest step along an axis in a slot.
 
     Raises:
         InputError: the helper is too slow, or the scenario too large, to be solved meanwhile.
     """
     _require_size(scenario)
-    way = scenario.max_speed * scenario.slot_duration
-    if way * _MOST_SPACINGS < scenario.map_side:
+    step = scenario.max_speed * scenario.slot_duration
+    if step * _MOST_SPACINGS < scenario.map_side:
         least = scenario.map_side / (_MOST_SPACINGS * scenario.slot_duration)
         accepted = f"at least {least:.4g} m/s for the optimum on this page"
         raise InputError(rejection("max_speed", scenario.max_speed, accepted))
-    coarse = way / math.ceil(way * _COARSE_SPACINGS / scenario.map_side)
+    coarse = step / math.ceil(step * _COARSE_SPACINGS / scenario.map_side)
     return min(RESOLUTION * scenario.map_side / 200, coarse) if fine else coarse
 
 
@@ -150,3 +156,46 @@ def _saved(run: str, stamp: Stamp) -> tuple[RunConfiguration, dict[str, Tensor]]
         accepted = f"weights of {len(configuration.learners)} learners"
         raise InputError(rejection("checkpoint", str(directory.best_checkpoint), accepted))
     return configuration, weights
+
+
+def fly_now(run: RunDirectory, name: str) -> tuple[Scenario, Evaluation]:
+    """Fly the best weights and the straight flights through a few episodes.
+
+    Args:
+        run: whose weights they are.
+        name: of its scenario.
+
+    Returns:
+        the scenario, over a horizon for which there are learners, and what came of it.
+
+    Raises:
+        InputError: the weights cannot be read, or do not fit.
+    """
+    configuration = run.configuration()
+    scenario = configuration.scenario
+    horizons = [learner.num_slots or scenario.num_slots for learner in configuration.learners]
+    if scenario.num_slots not in horizons:
+        scenario = dataclasses.replace(scenario, num_slots=max(horizons))
+    policies = learned_policies([run], scenario)
+    policies |= straight_policies(scenario)[0]
+    return scenario, evaluate(scenario, name, policies, QUICK)
+
+
+def fly_first_learner(run: RunDirectory, configuration: RunConfiguration) -> tuple[str, Evaluation]:
+    """Fly the best weights of a run's first scheme through two episodes.
+
+    Args:
+        run: whose weights they are.
+        configuration: of the run.
+
+    Returns:
+        the scheme, and what came of it.
+
+    Raises:
+        InputError: the weights cannot be read, or do not fit.
+    """
+    scenario = configuration.scenario
+    policies = learned_policies([run], scenario)
+    scheme = next(scheme for scheme in LABELS if scheme in policies)
+    own = {scheme: policies[scheme]}
+    return scheme, evaluate(scenario, configuration.scenario_name, own, _FEW)

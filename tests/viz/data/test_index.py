@@ -8,7 +8,7 @@ import pytest
 from dashboard_runs import WriteRun, metrics_row
 from hyuav._support.errors import InputError
 from hyuav.experiments.metrics import parse_rows
-from hyuav.viz.dashboard.index import MOST_DRAWN, RUNNING_SECONDS, RunIndex
+from hyuav.viz.data.index import MOST_DRAWN, RUNNING_SECONDS, RunIndex
 
 
 def test_a_run_is_listed_with_what_it_is_and_how_far_it_has_come(
@@ -179,20 +179,19 @@ def test_no_symbolic_link_leads_out_of_the_directory(write: WriteRun, tmp_path: 
             read()
 
 
-def test_the_optima_of_an_evaluation_are_read(trained: Path) -> None:
-    optima = RunIndex(trained).optima("tiny")
+def test_the_optima_of_an_evaluation_are_read(trained_runs: Path) -> None:
+    optima = RunIndex(trained_runs).optima("tiny")
     assert set(optima) == {"hybrid", "relay", "jamming"}
     assert optima["hybrid"] >= optima["relay"] > 0
 
 
-def test_a_damaged_evaluation_is_refused_and_a_foreign_one_has_no_optima(
-    write: WriteRun, tmp_path: Path
+@pytest.mark.parametrize("content", ['{"schemes": {"optimum": 3}}', '{"schemes": {"optimum"'])
+def test_a_damaged_or_foreign_evaluation_is_refused(
+    write: WriteRun, tmp_path: Path, content: str
 ) -> None:
     file = write("run", 1) / "evaluation.json"
     index = RunIndex(tmp_path / "runs")
     assert index.optima("run") == {}
-    file.write_text('{"schemes": {"optimum": 3}}')
-    assert index.optima("run") == {}
-    file.write_text('{"schemes": {"optimum"')
-    with pytest.raises(InputError, match="expected what an evaluation wrote"):
+    file.write_text(content)
+    with pytest.raises(InputError, match=r"evaluation\.json: expected an evaluation in JSON"):
         index.optima("run")

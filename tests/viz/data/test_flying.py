@@ -7,7 +7,7 @@ from dashboard_runs import SCENARIO
 from hyuav import Scenario
 from hyuav._support.errors import InputError
 from hyuav.references.optimum import solve
-from hyuav.viz.dashboard.flying import (
+from hyuav.viz.data.flying import (
     COARSE_DRAWS,
     checkpoint_of,
     flown,
@@ -15,7 +15,7 @@ from hyuav.viz.dashboard.flying import (
     optimum,
     resolution,
 )
-from hyuav.viz.dashboard.index import RunIndex
+from hyuav.viz.data.index import RunIndex
 
 
 def test_the_optimum_of_the_page_is_that_of_the_solver() -> None:
@@ -25,7 +25,7 @@ def test_the_optimum_of_the_page_is_that_of_the_solver() -> None:
     assert coarse.path.equal(expected.path)
 
 
-def test_the_coarse_grid_holds_the_longest_way_of_a_slot() -> None:
+def test_the_coarse_grid_holds_the_longest_step_of_a_slot() -> None:
     for speed in (1.0, 7.0, 20.0, 1000.0):
         scenario = dataclasses.replace(SCENARIO, max_speed=speed)
         spacing = resolution(scenario, fine=False)
@@ -47,8 +47,8 @@ def test_what_takes_too_long_to_solve_is_refused(changed: dict[str, object], lin
     assert str(refused.value).startswith(line)
 
 
-def test_a_checkpoint_flies_beside_the_optimum_in_a_changed_scenario(trained: Path) -> None:
-    checkpoint = checkpoint_of(RunIndex(trained), "tiny", 0)
+def test_a_checkpoint_flies_beside_the_optimum_in_a_changed_scenario(trained_runs: Path) -> None:
+    checkpoint = checkpoint_of(RunIndex(trained_runs), "tiny", 0)
     louder = dataclasses.replace(SCENARIO, jamming_power=0.01, num_slots=12)
     schemes = flown(louder, "hybrid", checkpoint).summary["schemes"]
     assert set(schemes) == {"optimum", "proposed"}
@@ -57,8 +57,8 @@ def test_a_checkpoint_flies_beside_the_optimum_in_a_changed_scenario(trained: Pa
     assert schemes["optimum"]["secrecy_sum_rate"] != before["optimum"]["secrecy_sum_rate"]
 
 
-def test_each_learner_of_a_run_flies_its_own_way(trained: Path) -> None:
-    index = RunIndex(trained)
+def test_each_learner_of_a_run_flies_its_own_trajectory(trained_runs: Path) -> None:
+    index = RunIndex(trained_runs)
     first, second = (
         flown_by(SCENARIO, rule, checkpoint_of(index, "tiny", number)).flights
         for number, rule in enumerate(("hybrid", "relay"))
@@ -68,17 +68,17 @@ def test_each_learner_of_a_run_flies_its_own_way(trained: Path) -> None:
     assert (first["x"] - second["x"]).abs().max() > 0.1
 
 
-def test_a_checkpoint_flies_only_with_as_many_ues_as_it_knows(trained: Path) -> None:
-    checkpoint = checkpoint_of(RunIndex(trained), "tiny", 0)
+def test_a_checkpoint_flies_only_with_as_many_ues_as_it_knows(trained_runs: Path) -> None:
+    checkpoint = checkpoint_of(RunIndex(trained_runs), "tiny", 0)
     fewer = dataclasses.replace(SCENARIO, ue_positions=SCENARIO.ue_positions[1:])
     with pytest.raises(InputError, match="number of UEs = 9: expected 10, for which"):
         flown(fewer, "hybrid", checkpoint)
 
 
-def test_a_checkpoint_alone_flies_no_longer_than_one_waits(trained: Path) -> None:
+def test_a_checkpoint_alone_flies_no_longer_than_one_waits(trained_runs: Path) -> None:
     longer = dataclasses.replace(SCENARIO, num_slots=501)
     with pytest.raises(InputError, match="num_slots = 501: expected a whole number <= 500"):
-        flown_by(longer, "hybrid", checkpoint_of(RunIndex(trained), "tiny", 0))
+        flown_by(longer, "hybrid", checkpoint_of(RunIndex(trained_runs), "tiny", 0))
 
 
 def test_a_foreign_checkpoint_is_refused_and_a_mended_one_taken(runs: Path) -> None:

@@ -1,0 +1,169 @@
+"""What a comparison of algorithms shows, and how each algorithm looks in its pictures."""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from hyuav._support.errors import InputError
+from hyuav.envs.rendering import OKABE_ITO
+from hyuav.experiments.comparison.plan import ENTRIES, LAYOUT, PIECES, Compare
+from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
+from hyuav.experiments.comparison.statistics import performance_profiles
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.learning.registry import PEER
+from hyuav.viz.data.reading import readable_config, readable_table
+
+_OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
+
+ENTRY_COLORS = {name: OKABE_ITO[_OTHERS[i % len(_OTHERS)]] for i, name in enumerate(ENTRIES)} | {
+    PEER: OKABE_ITO["vermillion"]
+}
+"""The same color for an algorithm in every figure."""
+
+_UNKNOWN = "#777777"
+"""Of an algorithm or a piece that is not offered now: another user's own, an earlier version's."""
+
+_IDENTITY = {"algorithm", "scenario", "scheme", "num_slots", "seed"}
+_RESULTS = {"fraction", "episodes_to_threshold", "seconds_to_threshold", "seconds"} | _IDENTITY
+_CURVES = {"episode", "fraction"} | _IDENTITY
+
+
+def entry_color(entry: str) -> str:
+    """An entry's color; a variant without a piece has that of the piece."""
+    piece = entry.partition("-")[2]
+    if piece in PIECES:
+        return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]]
+    return _UNKNOWN if piece else ENTRY_COLORS.get(entry, _UNKNOWN)
+
+
+def entry_line(entry: str) -> int:
+    """Which line and marker tell an entry from others of its color; 0 of a whole algorithm."""
+    piece = entry.partition("-")[2]
+    return 1 + PIECES.index(piece) // len(_OTHERS) if piece in PIECES else 0
+
+
+def is_comparison(directory: Path) -> bool:
+    """Whether a directory holds a comparison, however much of it is there yet, and no run."""
+    begun = (directory / "shards").is_dir() or (directory / RESULTS_FILE).is_file()
+    return begun or "hyperparameters" in readable_config(directory)
+
+
+def profiles(results: pd.DataFrame) -> pd.DataFrame:
+    """The share of learners that reach each share of the optimum, from where some do not.
+
+    Args:
+        results: a row for each learner, as :class:`.comparison.directory.Summary` holds them.
+
+    Returns:
+        as :func:`.statistics.performance_profiles`.
+    """
+    lowest = max(math.floor(20 * results["fraction"].min()) / 20, 0.0)
+    return performance_profiles(results, np.linspace(min(lowest, 0.95), 1.0, 101))
+
+
+class TrainedEntry(NamedTuple):
+    """A finished training of a comparison, whose weights are kept."""
+
+    entry: str
+    """What is compared."""
+    run: RunDirectory
+    configuration: RunConfiguration
+
+
+class ReadableComparison:
+    """What the directory of a comparison tells, however much of it is there yet.
+
+    Args:
+        directory: of the comparison.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.directory, self.config = directory, readable_config(directory)
+        value = self.config.get("threshold")
+        self.threshold = 0.97
+        if isinstance(value, int | float) and 0 <= value <= 1:
+            self.threshold = float(value)
+        self._asked = _Asked.of(self.config)
+
+    @property
+    def results(self) -> pd.DataFrame | None:
+        """A row for each learner of the finished trainings, or of what was gathered of them."""
+        return self._rows(RESULTS_FILE, _RESULTS)
+
+    @property
+    def curves(self) -> pd.DataFrame | None:
+        """A row for each of their evaluations in training."""
+        return self._rows(CURVES_FILE, _CURVES)
+
+    def trained(self) -> list[TrainedEntry]:
+        """The finished trainings: the longest horizons first, and presets before layouts."""
+        return sorted(self._trained(), key=self._asked.flown)
+
+    def _rows(self, name: str, columns: set[str]) -> pd.DataFrame | None:
+        paths = [path / name for path in self._finished()] or [self.directory / name]
+        read = (readable_table(path, columns) for path in paths)
+        tables = sorted((table for table in read if table is not None), key=self._asked.place)
+        return pd.concat(tables, ignore_index=True) if tables else None
+
+    def _finished(self) -> list[Path]:
+        return sorted(path.parent for path in self.directory.glob(f"shards/*/{RESULTS_FILE}"))
+
+    def _trained(self) -> Iterator[TrainedEntry]:
+        for path in self._finished():
+            run = RunDirectory(path)
+            try:
+                configuration = run.configuration()
+            except InputError:
+                continue
+            horizon = f"_T{configuration.scenario.num_slots}"
+            entry = path.name.partition(f"_{configuration.scenario_name}{horizon}")[0]
+            if run.best_checkpoint.is_file():
+                yield TrainedEntry(entry, run, configuration)
+
+
+class _Asked(NamedTuple):
+    """The order in which a comparison was asked for; what is unknown comes last."""
+
+    entries: Sequence[str] = ()
+    scenarios: Sequence[str] = ()
+    horizons: Sequence[int] = ()
+
+    @classmethod
+    def of(cls, config: Mapping[str, Any]) -> "_Asked":
+        """Of a comparison's ``config.yaml``, which may be damaged or of another version."""
+        names = [field.name for field in dataclasses.fields(Compare)]
+        try:
+            asked = Compare.from_dict({name: config[name] for name in names if name in config})
+        except InputError:
+            return cls()
+        return cls(asked.entries, asked.scenario, asked.num_slots)
+
+    def place(self, table: pd.DataFrame) -> tuple[int, int, int]:
+        """Of a training's table."""
+        algorithm, scenario, num_slots = table[["algorithm", "scenario", "num_slots"]].iloc[0]
+        return (
+            _index(self.entries, algorithm),
+            _index(self.scenarios, scenario),
+            _index(self.horizons, num_slots),
+        )
+
+    def flown(self, trained: TrainedEntry) -> tuple[Any, ...]:
+        """Of a training's flight."""
+        name = trained.configuration.scenario_name
+        return (
+            name.startswith(LAYOUT),
+            -trained.configuration.scenario.num_slots,
+            _index(self.scenarios, name),
+            name,
+            _index(self.entries, trained.entry),
+        )
+
+
+def _index(values: Sequence[Any], value: object) -> int:
+    told = [str(own) for own in values]
+    return told.index(str(value)) if str(value) in told else len(told)
