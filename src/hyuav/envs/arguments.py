@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import torch
+from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.physics.scenario import Scenario
@@ -42,6 +43,16 @@ def as_schemes(scheme: str | Sequence[str], batch_size: torch.Size) -> tuple[str
         rows = batch_size[0] if batch_size else 0
         raise InputError(rejection("scheme", scheme, f"one name, or one for each of {rows} rows"))
     return tuple(scheme)
+
+
+def require_shape(name: str, values: Tensor, shape: Sequence[int]) -> None:
+    """Accept a tensor of this shape.
+
+    Raises:
+        InputError: it has another.
+    """
+    if values.shape != (expected := tuple(shape)):
+        raise InputError(rejection(name, tuple(values.shape), f"shape {expected}"))
 
 
 def as_device(device: torch.device | str | None) -> torch.device:

@@ -122,6 +122,16 @@ class Scenario(Parameters):
         """U, the number of UEs."""
         return len(self.ue_positions)
 
+    @property
+    def num_helpers(self) -> int:
+        """H, the number of helpers."""
+        return 1
+
+    @property
+    def num_eavesdroppers(self) -> int:
+        """E, the number of eavesdroppers."""
+        return 1
+
     @classmethod
     def preset(cls, name: str) -> Self:
         """The layout called ``name`` with the paper's parameters.
