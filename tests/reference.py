@@ -75,7 +75,7 @@ def distance(a: Numbers, b: Numbers) -> float:
 
 
 def distances(s: Scenario, helper: Numbers) -> list[float]:
-    nodes = [*s.ue_positions, s.legitimate_position, s.eavesdropper_position]
+    nodes = [*s.ue_positions, s.legitimate_position, s.eavesdropper_positions[0]]
     return [distance(helper, node) for node in nodes]
 
 
@@ -88,13 +88,13 @@ def gains(s: Scenario, helper: Numbers, fading: Numbers | None) -> Gains:
         return s.ground_to_air_gain / (height**2 + distance(s.ue_positions[u], node) ** 2)
 
     to_legitimate = max(distance(helper, s.legitimate_position), 1.0)
-    to_eavesdropper = distance(helper, s.eavesdropper_position)
+    to_eavesdropper = distance(helper, s.eavesdropper_positions[0])
     climb = s.altitude - s.eavesdropper_altitude
     return Gains(
         g_ul=[ground(u, s.legitimate_position, s.altitude) * power[u] for u in range(count)],
         g_uh=[ground(u, helper, s.altitude) * power[count + u] for u in range(count)],
         g_ue=[
-            ground(u, s.eavesdropper_position, s.eavesdropper_altitude) * power[2 * count + u]
+            ground(u, s.eavesdropper_positions[0], s.eavesdropper_altitude) * power[2 * count + u]
             for u in range(count)
         ],
         g_hl=s.air_to_air_gain / to_legitimate**2 * power[3 * count],
@@ -267,8 +267,8 @@ def scenarios(draw: st.DrawFn, fading: bool | None = None) -> Scenario:
     values: dict[str, Any] = {
         "ue_positions": ues,
         "legitimate_position": legitimate,
-        "eavesdropper_position": draw(coordinates(half)),
-        "helper_start": draw(coordinates(half)),
+        "eavesdropper_positions": draw(coordinates(half)),
+        "helper_starts": draw(coordinates(half)),
         "num_slots": draw(st.integers(1, 50)),
         "slot_duration": slot_duration,
         "map_side": map_side,
@@ -315,7 +315,7 @@ def helpers(draw: st.DrawFn, scenario: Scenario) -> tuple[float, float]:
     target = draw(st.sampled_from(["anywhere", "UEs", "E"]))
     if target == "anywhere":
         return x, y
-    around = scenario.eavesdropper_position if target == "E" else scenario.ue_positions[0]
+    around = scenario.eavesdropper_positions[0] if target == "E" else scenario.ue_positions[0]
     near = (around[0] + x / 16, around[1] + y / 16)
     return min(max(near[0], -half), half), min(max(near[1], -half), half)
 

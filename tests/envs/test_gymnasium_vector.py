@@ -134,7 +134,7 @@ def test_gymnasium_s_own_wrappers_understand_the_batch(make_vec: Build) -> None:
         earned += reward
     assert [info["episode"]["l"] for info in infos] == [SHORT.num_slots] * 2
     np.testing.assert_allclose([info["episode"]["r"] for info in infos], earned)
-    assert tuple(infos[0]["position"]) == SCENARIO.helper_start
+    assert tuple(infos[0]["position"]) == SCENARIO.helper_starts[0]
 
 
 def test_each_row_may_fly_its_own_scheme(make_vec: Build) -> None:

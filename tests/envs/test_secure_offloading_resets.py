@@ -26,7 +26,7 @@ def test_the_mode_after_a_reset_follows_that_resets_fading() -> None:
 
 
 def test_an_episode_starts_at_the_helpers_start() -> None:
-    env = SecureOffloadingEnv(changed(TWO_CLUSTERS, helper_start=(12.0, -34.0)), batch_size=(2, 3))
+    env = SecureOffloadingEnv(changed(TWO_CLUSTERS, helper_starts=(12.0, -34.0)), batch_size=(2, 3))
     state = env.reset()
     assert state["position"].tolist() == [[[12.0, -34.0]] * 3] * 2
     assert not state["off_map"].any()
@@ -82,7 +82,7 @@ def test_the_same_seed_gives_the_same_episode_with_and_without_diagnostics(
     seed: int, scheme: str
 ) -> None:
     # With an edge budget that binds, tasks decide who offloads.
-    scenario = changed(RANDOM_DISK, edge_energy_budget=5.0, helper_start=(70.0, 70.0))
+    scenario = changed(RANDOM_DISK, edge_energy_budget=5.0, helper_starts=(70.0, 70.0))
     episodes = []
     for diagnostics in (False, True, False):
         torch.manual_seed(99)  # of the random actions

@@ -148,7 +148,7 @@ def test_the_observation_is_of_order_one_in_the_corners_of_the_map(
     # Every node in the opposite corner: no distance on the map is longer.
     opposite = (-corner[0], -corner[1])
     scenario = Scenario(
-        ue_positions=(opposite,), legitimate_position=opposite, eavesdropper_position=opposite
+        ue_positions=(opposite,), legitimate_position=opposite, eavesdropper_positions=opposite
     )
     observation = start_at(make_env(scenario), corner)["observation"]
     assert observation[3:].tolist() == pytest.approx([2 * 2**0.5 - 1] * 3)
@@ -302,7 +302,7 @@ def test_bad_arguments_are_answered_in_one_line(arguments: dict[str, Any], field
 def test_the_fading_that_is_told_is_what_the_slot_was_earned_by(
     batch_size: tuple[int, ...], fading: bool
 ) -> None:
-    scenario = dataclasses.replace(TWO_CLUSTERS, fading=fading, helper_start=(-40.0, 0.0))
+    scenario = dataclasses.replace(TWO_CLUSTERS, fading=fading, helper_starts=(-40.0, 0.0))
     env = make_env(scenario, "relay", batch_size, seed=0, fading=True)
     check_env_specs(env)
     silent = make_env(scenario, "relay", batch_size, seed=0)

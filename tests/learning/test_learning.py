@@ -13,7 +13,7 @@ from hyuav.learning.training import Training, TrainingParameters
 from hyuav.references.optimum import solve
 
 EASY = dataclasses.replace(
-    Scenario.preset("two_clusters"), helper_start=(20.0, 20.0), num_slots=10, fading=False
+    Scenario.preset("two_clusters"), helper_starts=(20.0, 20.0), num_slots=10, fading=False
 )
 """Jamming pays within two slots of the start: a small network finds it in few episodes."""
 

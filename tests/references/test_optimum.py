@@ -30,7 +30,7 @@ def without_fading(name: str = "two_clusters", **changes: Any) -> Scenario:
 
 def few_flights(**changes: Any) -> Scenario:
     """So few slots, from a start between both modes' regions, that every flight can be tried."""
-    return without_fading(helper_start=(30.0, 30.0), num_slots=3, **changes)
+    return without_fading(helper_starts=(30.0, 30.0), num_slots=3, **changes)
 
 
 def flown_return(optimum: Optimum, episodes: int) -> torch.Tensor:
@@ -67,7 +67,7 @@ def brute_force(scenario: Scenario, scheme: str, resolution: float) -> float:
     system = SecureOffloadingSystem(scenario, dtype=torch.float64)
     half = scenario.map_side / 2
     count = int(scenario.map_side / resolution)
-    axis = [scenario.helper_start[0] + resolution * k for k in range(-count, count + 1)]
+    axis = [scenario.helper_starts[0][0] + resolution * k for k in range(-count, count + 1)]
     points = list(itertools.product([x for x in axis if abs(x) <= half], repeat=2))
     relay, jamming = system.sum_rates(torch.tensor(points, dtype=torch.float64))
     rewards = {"relay": relay, "jamming": jamming, "hybrid": torch.maximum(relay, jamming)}
@@ -87,7 +87,7 @@ def brute_force(scenario: Scenario, scheme: str, resolution: float) -> float:
             return 0.0
         return max(reward[after] + best(after, slots - 1) for after in nearby[point])
 
-    return best(scenario.helper_start, scenario.num_slots)
+    return best(scenario.helper_starts[0], scenario.num_slots)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -182,7 +182,7 @@ def test_a_position_on_the_edge_of_coverage_or_map_is_flown_just_inside() -> Non
         coverage_radius=radius,
         map_side=100.0,
         ue_positions=((0.3, 0.7),),
-        eavesdropper_position=(40.0, 40.0),
+        eavesdropper_positions=(40.0, 40.0),
     )
     edge = (0.3 + radius * 0.6, 0.7 + radius * 0.8)
     path = torch.tensor([(10.0, 20.0), edge, (35.0, 40.0), corner], dtype=torch.float64)

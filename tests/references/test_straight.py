@@ -24,7 +24,7 @@ def test_re_lt_reaches_midway_between_l_and_the_ues_in_the_last_slot(
 @pytest.mark.parametrize("scenario", PRESETS)
 def test_ja_lt_reaches_the_eavesdropper_in_the_last_slot(scenario: Scenario) -> None:
     flown = make_env(scenario, "jamming").rollout(20, ja_lt(scenario))
-    expected = torch.tensor(scenario.eavesdropper_position)
+    expected = torch.tensor(scenario.eavesdropper_positions[0])
     torch.testing.assert_close(flown["next", "position"][-1], expected, atol=1e-3, rtol=0)
 
 

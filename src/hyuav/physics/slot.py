@@ -66,13 +66,13 @@ class SecureOffloadingSystem:
             (
                 *scenario.ue_positions,
                 scenario.legitimate_position,
-                scenario.eavesdropper_position,
+                scenario.eavesdropper_positions[0],
             )
         )
-        self.helper_start = self._tensor(scenario.helper_start)
+        self.helper_start = self._tensor(scenario.helper_starts[0])
         ue_to_legitimate, ue_to_eavesdropper = (
             channel.horizontal_distance(self.ue_positions, self._tensor(position))
-            for position in (scenario.legitimate_position, scenario.eavesdropper_position)
+            for position in (scenario.legitimate_position, scenario.eavesdropper_positions[0])
         )
         self._ue_to_legitimate = ue_to_legitimate
         self._path_to_legitimate = channel.path_gain(

@@ -46,7 +46,7 @@ def grid_over_map(scenario: Scenario, resolution: float) -> Grid:
     """
     half = scenario.map_side / 2
     axes, origin = [], []
-    for coordinate in scenario.helper_start:
+    for coordinate in scenario.helper_starts[0]:
         before = int((half + coordinate) / resolution * (1 + ROUNDING))
         after = int((half - coordinate) / resolution * (1 + ROUNDING))
         axis = coordinate + resolution * np.arange(-before, after + 1)

@@ -20,11 +20,11 @@ def relay_destination(scenario: Scenario) -> Point:
 
 def jamming_destination(scenario: Scenario) -> Point:
     """Where Ja-LT arrives: the eavesdropper UAV's position, in m."""
-    return scenario.eavesdropper_position
+    return scenario.eavesdropper_positions[0]
 
 
 class ConstantVelocity(TensorDictModuleBase):
-    """Fly straight and at constant speed from ``helper_start`` to a point, reached in slot T.
+    """Fly straight and at constant speed from the helper's start to a point, reached in slot T.
 
     Writes ``action`` (..., 2) beside the ``position`` (..., 2) that it reads.
 
@@ -45,7 +45,7 @@ class ConstantVelocity(TensorDictModuleBase):
         duration = scenario.num_slots * scenario.slot_duration
         velocity = [
             (end - start) / duration
-            for start, end in zip(scenario.helper_start, destination, strict=True)
+            for start, end in zip(scenario.helper_starts[0], destination, strict=True)
         ]
         fastest = max(abs(component) for component in velocity)
         if scenario.speed_limit == "disc":
@@ -63,7 +63,7 @@ class ConstantVelocity(TensorDictModuleBase):
         scenario: Scenario, destination: Point, needed: float, limit: float, name: str
     ) -> None:
         if needed > limit * (1 + 1e-6):
-            start, end = (f"({x:g}, {y:g})" for x, y in (scenario.helper_start, destination))
+            start, end = (f"({x:g}, {y:g})" for x, y in (scenario.helper_starts[0], destination))
             raise InputError(
                 f"num_slots = {scenario.num_slots}: a straight flight from {start} to {end} "
                 f"needs {needed:.4g} m/s, and {name} allows {limit:.4g} m/s"

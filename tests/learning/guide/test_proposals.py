@@ -18,9 +18,9 @@ DEAR = {"jamming_power": 1000.0}  # a helper that may jam has less left to fly
 SMALL = {
     "map_side": 60.0,
     "max_speed": 19.0,
-    "helper_start": (-10.0, -10.0),
+    "helper_starts": (-10.0, -10.0),
     "legitimate_position": (0.0, 0.0),
-    "eavesdropper_position": (20.0, 20.0),
+    "eavesdropper_positions": (20.0, 20.0),
     "ue_positions": ((5.0, 6.0), (-7.0, 8.0)),
 }
 
@@ -28,7 +28,7 @@ SMALL = {
 def flights(scenario: Scenario) -> BestFlights:
     """The best hovers at the start, the one that was tried flies along x."""
     known = BestFlights(2, scenario)
-    start = torch.tensor(scenario.helper_start) / (scenario.map_side / 2)
+    start = torch.tensor(scenario.helper_starts[0]) / (scenario.map_side / 2)
     known.way.copy_(start.expand_as(known.way))
     reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
     known.tried_way.copy_(known.way)

@@ -36,7 +36,7 @@ def test_the_counts_are_of_the_ues_that_offload_there(crowded: bool) -> None:
 
 
 def test_moving_the_eavesdropper_changes_the_map() -> None:
-    moved = dataclasses.replace(SCENARIO, eavesdropper_position=(-50.0, 30.0))
+    moved = dataclasses.replace(SCENARIO, eavesdropper_positions=(-50.0, 30.0))
     before, after = (explorer_map(scenario, "hybrid", "rate") for scenario in (SCENARIO, moved))
     assert not np.array_equal(before.data[0].z, after.data[0].z)
 
@@ -57,6 +57,6 @@ def test_flights_lie_over_the_map_and_below_the_nodes() -> None:
     pieces = [trace for trace in figure.data if trace.name == "Optimum"]
     assert {trace.line.color for trace in pieces} == {scheme_color("optimum")}
     assert {trace.line.dash == "solid" for trace in pieces} == {True, False}
-    assert (pieces[0].x[0], pieces[0].y[0]) == SCENARIO.helper_start
+    assert (pieces[0].x[0], pieces[0].y[0]) == SCENARIO.helper_starts[0]
     assert names.index("Optimum") < names.index("eavesdropper (E)")
     assert names[-1] == CLICK_TRACE

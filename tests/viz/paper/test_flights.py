@@ -29,7 +29,7 @@ def test_trajectories_lie_over_the_optimums_flight(
     (axes,) = figure.axes
     best = max(axes.lines, key=lambda line: line.get_linewidth())
     path = np.asarray(best.get_xydata())
-    assert path[0].tolist() == list(scenario.helper_start)
+    assert path[0].tolist() == list(scenario.helper_starts[0])
     assert len(path) == scenario.num_slots + 1
     own = [line for line in axes.lines if to_hex(line.get_color()) == COLORS["proposed"].lower()]
     dots = np.concatenate([line.get_xydata() for line in own if line.get_marker() == "o"])
@@ -46,10 +46,10 @@ def test_the_tables_hold_the_flights_from_the_start_and_all_nodes(
     flight = tables[""]
     assert set(flight["scheme"]) == {"re_lt"}
     assert flight["slot"].tolist() == list(range(11))
-    assert flight[["x", "y"]].iloc[0].to_list() == list(scenario.helper_start)
+    assert flight[["x", "y"]].iloc[0].to_list() == list(scenario.helper_starts[0])
     assert flight["relay"].tolist() == [None] + [True] * 10
     nodes = tables["nodes"].set_index("node")
     places = nodes[["x", "y"]].T.to_dict("list")
     assert places["UE 10"] == list(scenario.ue_positions[9])
-    assert places["E"] == list(scenario.eavesdropper_position)
+    assert places["E"] == list(scenario.eavesdropper_positions[0])
     assert nodes["coverage"].dropna().to_dict() == {"L": scenario.coverage_radius}

@@ -15,8 +15,8 @@ Draft = dict[str, Any]
 
 NODES = {
     "legitimate_position": "legitimate UAV (L)",
-    "eavesdropper_position": "eavesdropper (E)",
-    "helper_start": "helper's start (H)",
+    "eavesdropper_positions": "eavesdropper (E)",
+    "helper_starts": "helper's start (H)",
 }
 """The nodes that every scenario has, beside the UEs."""
 
@@ -88,14 +88,16 @@ def position(draft: Draft, node: str) -> Point:
     if node.startswith("UE "):
         x, y = draft["ue_positions"][int(node[3:]) - 1]
     else:
-        x, y = draft[_field(node)]
+        place = draft[_field(node)]
+        x, y = place if _field(node) == "legitimate_position" else place[0]
     return float(x), float(y)
 
 
 def moved(draft: Draft, node: str, to: Point) -> Draft:
     """The draft with a node elsewhere."""
     if not node.startswith("UE "):
-        return {**draft, _field(node): to}
+        field = _field(node)
+        return {**draft, field: to if field == "legitimate_position" else [to]}
     ues = list(draft["ue_positions"])
     ues[int(node[3:]) - 1] = to
     return {**draft, "ue_positions": ues}

@@ -118,7 +118,7 @@ def _colorbar(title: str) -> dict[str, Any]:
 def _flight(scenario: Scenario, scheme: str, rows: pd.DataFrame) -> Iterator[go.Scatter]:
     """The path on a white ground, a piece for each stretch in one mode."""
     rows = rows.sort_values("slot")
-    path = np.vstack([scenario.helper_start, rows[["x", "y"]].to_numpy(dtype=float)])
+    path = np.vstack([scenario.helper_starts[0], rows[["x", "y"]].to_numpy(dtype=float)])
     label, color = scheme_label(scheme), scheme_color(scheme)
     common = {"legendgroup": label, "hoverinfo": "skip"}
     ground = {"color": "white", "width": 6}
@@ -150,8 +150,8 @@ def _flight(scenario: Scenario, scheme: str, rows: pd.DataFrame) -> Iterator[go.
 def _start(scenario: Scenario) -> go.Scatter:
     marker = {"symbol": "diamond", "size": 11, "color": HELPER_COLOR}
     return go.Scatter(
-        x=[scenario.helper_start[0]],
-        y=[scenario.helper_start[1]],
+        x=[scenario.helper_starts[0][0]],
+        y=[scenario.helper_starts[0][1]],
         mode="markers",
         marker=marker | {"line": {"color": "white", "width": 1}},
         name="helper's start",

@@ -50,7 +50,7 @@ def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode:
         raise InputError(rejection("flights", f"{scheme} {episode}", accepted))
     others = rows[["edge_energy", "helper_energy"]].to_numpy(float)
     return Flight(
-        np.vstack([scenario.helper_start, rows[["x", "y"]].to_numpy(float)]).round(2),
+        np.vstack([scenario.helper_starts[0], rows[["x", "y"]].to_numpy(float)]).round(2),
         rows["relay"].to_numpy(bool),
         np.array(lists["offloading"], dtype=bool),
         np.array(lists["secrecy_rate"], dtype=float),

@@ -38,7 +38,7 @@ def first_flight(flights: pd.DataFrame, scheme: str) -> pd.DataFrame:
 
 def path_of(scenario: Scenario, slots: pd.DataFrame) -> NDArray[np.float64]:
     """The start and the position in each slot: (T + 1, 2) m."""
-    return np.vstack([scenario.helper_start, slots[["x", "y"]].to_numpy()])
+    return np.vstack([scenario.helper_starts[0], slots[["x", "y"]].to_numpy()])
 
 
 def trajectories(scenario: Scenario, flights: pd.DataFrame) -> Figure:
@@ -153,7 +153,7 @@ def flight_tables(
             columns = {"slot": range(len(path)), "x": path[:, 0], "y": path[:, 1], "relay": relay}
             paths.append(pd.DataFrame({"scheme": scheme, **columns}))
     places = {f"UE {u}": place for u, place in enumerate(scenario.ue_positions, start=1)}
-    places |= {"L": scenario.legitimate_position, "E": scenario.eavesdropper_position}
+    places |= {"L": scenario.legitimate_position, "E": scenario.eavesdropper_positions[0]}
     nodes = pd.DataFrame([(name, *place) for name, place in places.items()])
     nodes.columns = pd.Index(["node", "x", "y"])
     nodes["coverage"] = [scenario.coverage_radius if name == "L" else np.nan for name in places]
