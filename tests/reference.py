@@ -17,6 +17,10 @@ from numpy.typing import NDArray
 from tensordict import TensorDict
 
 from hyuav import Scenario
+from hyuav.physics import slot as package
+from hyuav.physics.layout import Nodes
+from hyuav.physics.slot import Control, Physics, SlotOutcome
+from hyuav.physics.tasks import Tasks
 
 RELAY, JAMMING = 1, 0
 
@@ -336,15 +340,41 @@ def changed(scenario: Scenario, **changes: Any) -> Scenario:
 
 
 def start_at(env: Any, position: Any) -> Any:
-    """Reset the environment with its helpers at ``position``."""
-    position = torch.as_tensor(position, dtype=torch.float32)
+    """Reset the environment with one helper in each row, at ``position`` (*batch_size, 2)."""
+    position = torch.as_tensor(position, dtype=torch.float32).unsqueeze(-2)
     return env.reset(TensorDict({"position": position}, batch_size=env.batch_size))
 
 
 def fly(env: Any, state: Any, action: Any) -> Any:
     """What the next slot brings, physical entries and diagnostics."""
     action = torch.as_tensor(action, dtype=torch.float32).expand(*env.batch_size, 2)
+    action = action.reshape(env.action_spec.shape)  # with the helper's axis where it has one
     return env.step(state.clone().set("action", action))["next"]
+
+
+def with_helper(physics: Physics, position: Any) -> Nodes:
+    """The scenario's nodes with the helper at (..., 2) m."""
+    position = torch.as_tensor(position, dtype=physics.dtype)
+    return physics.nodes._replace(helper=position.unsqueeze(-2))
+
+
+def hover(
+    physics: Physics,
+    position: Any,
+    fading: torch.Tensor | None = None,
+    tasks: Tasks | None = None,
+    **control: Any,
+) -> SlotOutcome:
+    """A slot of the package with the helper at (..., 2) m; the fading comes in rows."""
+    links = None if fading is None else physics.link_row.unflatten(fading)
+    staying = Control(torch.zeros(1, 2, dtype=physics.dtype), **control)
+    return package.slot(physics, with_helper(physics, position), staying, links, tasks)
+
+
+def place(entries: Any) -> torch.Tensor:
+    """Where the one helper of each row is: (..., 2) m."""
+    position: torch.Tensor = entries["position"]
+    return position.squeeze(-2)
 
 
 def next_draws(env: Any) -> tuple[list[list[float] | None], list[list[float]]]:

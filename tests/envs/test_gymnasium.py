@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from stable_baselines3.common import env_checker
 
 from hyuav import InputError, Scenario, make_env
-from reference import random_actions, torchrl_flight
+from reference import place, random_actions, torchrl_flight
 
 Build = Callable[..., Any]
 
@@ -74,7 +74,7 @@ def test_a_flight_is_that_of_the_torchrl_environment_with_the_same_seed(
         assert reward == slot["reward"].item()
         assert terminated is False
         assert truncated is slot["truncated"].item()
-        np.testing.assert_array_equal(info["position"], slot["position"])
+        np.testing.assert_array_equal(info["position"], place(slot))
         assert info["mode"] == slot["mode"].item()
         assert info["off_map"] is slot["off_map"].item()
 

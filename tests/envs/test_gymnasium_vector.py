@@ -10,7 +10,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from hyuav import InputError, Scenario, make_env
-from reference import random_actions, torchrl_flight
+from reference import place, random_actions, torchrl_flight
 
 Build = Callable[..., Any]
 
@@ -57,7 +57,7 @@ def test_a_batch_flies_as_the_torchrl_environment_of_that_batch_size(make_vec: B
         np.testing.assert_array_equal(reward, slot["reward"].squeeze(-1))
         np.testing.assert_array_equal(truncated, slot["truncated"].squeeze(-1))
         assert not terminated.any()
-        np.testing.assert_array_equal(info["position"], slot["position"])
+        np.testing.assert_array_equal(info["position"], place(slot))
         np.testing.assert_array_equal(info["mode"], slot["mode"].squeeze(-1))
         np.testing.assert_array_equal(info["off_map"], slot["off_map"].squeeze(-1))
     assert truncated.all()

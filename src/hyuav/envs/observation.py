@@ -85,7 +85,8 @@ class JointView(Transform):
             in_keys_inv=["action"],
             out_keys_inv=["action"],
         )
-        self._layout = ObservationLayout(scenario, clock=clock)
+        self.layout = ObservationLayout(scenario, clock=clock)
+        """Of the observations that are made here."""
         self._half_side = scenario.map_side / 2
         self._half_horizon = scenario.num_slots / 2 if clock else None
 
@@ -108,13 +109,13 @@ class JointView(Transform):
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Give the action that the environment takes the helper's axis."""
         action = tensordict["action"]
-        require_shape("action", action, (*tensordict.batch_size, self._layout.action_size))
-        tensordict["action"] = action.unflatten(-1, (self._layout.num_helpers, 2))
+        require_shape("action", action, (*tensordict.batch_size, self.layout.action_size))
+        tensordict["action"] = action.unflatten(-1, (self.layout.num_helpers, 2))
         return tensordict
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         """Add the observation to the specs."""
-        shape = (*observation_spec.shape, self._layout.size)
+        shape = (*observation_spec.shape, self.layout.size)
         observation_spec["observation"] = Unbounded(
             shape, dtype=torch.float32, device=observation_spec.device
         )
@@ -122,7 +123,7 @@ class JointView(Transform):
 
     def transform_action_spec(self, action_spec: Composite) -> Composite:
         """Flatten the action's spec."""
-        shape = (*action_spec.shape, self._layout.action_size)
+        shape = (*action_spec.shape, self.layout.action_size)
         action_spec["action"] = Bounded(
             -1.0, 1.0, shape, dtype=torch.float32, device=action_spec.device
         )
