@@ -48,8 +48,8 @@ from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
-from hyuav.physics.slot import SCHEMES
 from hyuav.references.optimum import require_resolution
 from hyuav.viz.html.page import write_run_report
 from hyuav.viz.paper.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
@@ -215,7 +215,7 @@ def _other_horizons(scenario: Scenario, options: Reproduce) -> list[int]:
 def _learners(options: Reproduce, seeds: int | None) -> tuple[Learner, ...]:
     """So many of each scheme."""
     several = range(options.seed, options.seed + (seeds or options.seeds))
-    return tuple(Learner(scheme, seed) for scheme in SCHEMES for seed in several)
+    return tuple(Learner(scheme, seed) for scheme in MODE_RULES for seed in several)
 
 
 def _over_horizons(

@@ -24,7 +24,7 @@ from hyuav.experiments.evaluation import (
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.weights import copy_weights
-from hyuav.references.optimum import FlightPolicy, solve
+from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
@@ -35,7 +35,7 @@ FEW = EvaluationParameters(episodes=40, flights=2, seed=5)
 def policies() -> dict[str, list[Policy]]:
     algorithm = DDPG(hidden_sizes=(8,))
     weights = copy_weights(algorithm.build(2, TEN_UES).loss)
-    optima = solve(SCENARIO, resolution=2.0)
+    optima = solve_optimum(SCENARIO, resolution=2.0)
     return {
         "re_lt": [Policy(re_lt(SCENARIO))],
         "ja_lt": [Policy(ja_lt(SCENARIO))],

@@ -56,7 +56,7 @@ def fly(warm_up: WarmUp, learners: int, num_slots: int) -> torch.Tensor:
     """Where an episode of learners whose actors want to stay leads: (slots, N, 2) m."""
     position, flight = torch.tensor(SCENARIO.helper_starts[0]).expand(learners, 2), []
     for count in range(num_slots):
-        seen = slot(learners, count).set("position", position)
+        seen = slot(learners, count).set("position", position.unsqueeze(-2))
         position = (position + 20.0 * warm_up(seen)["action"]).clamp(-100.0, 100.0)
         flight.append(position)
     return torch.stack(flight)

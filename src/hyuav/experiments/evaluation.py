@@ -57,7 +57,7 @@ MODE_RULES = {
     "re_lt": "relay",
     "re_optimum": "relay",
 }
-"""Who chooses the helper's mode in each scheme, a name of :data:`hyuav.physics.slot.SCHEMES`."""
+"""Who chooses the helper's mode in each scheme, of :data:`.offloading.MODE_RULES`."""
 
 OPTIMA = {"hybrid": "optimum", "jamming": "ja_optimum", "relay": "re_optimum"}
 """The optimum that a scheme with this mode rule is measured against."""
@@ -285,8 +285,8 @@ def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
         "scheme": [scheme] * (episodes * num_slots),
         "episode": np.repeat(np.arange(episodes), num_slots),
         "slot": np.tile(np.arange(1, num_slots + 1), episodes),
-        "x": flown["position"][..., 0],
-        "y": flown["position"][..., 1],
+        "x": flown["position"][..., 0, 0],
+        "y": flown["position"][..., 0, 1],
         "relay": flown["mode"] == 1,
         "off_map": flown["off_map"],
         "secrecy_sum_rate": secrecy_sum_rate(flown),

@@ -23,7 +23,7 @@ from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.training import Episode, Training
 from hyuav.learning.weights import count_learners, join_learners, select_learner
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import FlightPolicy, solve
+from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ConstantVelocity, ja_lt, re_lt
 
 LEARNED = {"hybrid": "proposed", "relay": "re_ot", "jamming": "ja_ot"}
@@ -364,7 +364,7 @@ def reference_policies(
         except InputError as error:
             print_line(f"{LABELS[name]} is left out: {error}", console)
     with make_progress(console, "optima") as progress:
-        optima = solve(scenario, resolution=resolution, track=progress.track)
+        optima = solve_optimum(scenario, resolution=resolution, track=progress.track)
     for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [Policy(FlightPolicy(optimum.path, scenario))]
     return policies

@@ -25,8 +25,8 @@ from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.training import TrainingParameters
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
-from hyuav.physics.slot import SCHEMES
 
 REPORT_FILE = "report.html"
 
@@ -277,7 +277,7 @@ class RunDirectory:
                 metrics.empty
                 or (
                     set(metrics.select_dtypes("number")) >= METRIC_NUMBERS  # truth values are none
-                    and metrics["scheme"].isin(SCHEMES).all()
+                    and metrics["scheme"].isin(MODE_RULES).all()
                 )
             )
             reason = "" if whole else "damaged"

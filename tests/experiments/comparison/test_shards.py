@@ -24,7 +24,7 @@ from hyuav.learning.cohort import Learner
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.registry import PEER
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.references.optimum import solve
+from hyuav.references.optimum import solve_optimum
 
 TRAINING = TrainingParameters(
     num_episodes=5,
@@ -57,7 +57,7 @@ def shard(optima: Optima, parent: Path, algorithm: str = "ddpg") -> Shard:
 
 
 def test_the_optima_are_kept_as_they_were_found(optima: Optima) -> None:
-    found = solve(SCENARIO, resolution=EVALUATION.resolution)
+    found = solve_optimum(SCENARIO, resolution=EVALUATION.resolution)
     for scheme, optimum in found.items():
         path = optima.policy(scheme, 6).module.get_buffer("path")
         assert np.array_equal(path, optimum.path)

@@ -20,25 +20,23 @@ NODES = {
 }
 """The nodes that every scenario has, beside the UEs."""
 
-GROUPS = {
-    "Flight": (
-        *("num_slots", "slot_duration", "max_speed", "speed_limit", "off_map_penalty"),
-        *("map_side", "altitude", "eavesdropper_altitude", "helper_mass"),
-    ),
-    "Radio": (
-        *("ue_power", "jamming_power", "relay_power", "noise_power", "ground_to_air_gain"),
-        *("air_to_air_gain", "ground_to_air_k_factor", "air_to_air_k_factor", "fading"),
-    ),
-    "Tasks": (
-        *("coverage_radius", "min_secrecy_rate", "task_size", "cycles_per_bit", "capacitance"),
-        *("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"),
-    ),
-}
-"""All parameters but the positions."""
+_FLIGHT = (
+    *("num_slots", "slot_duration", "max_speed", "speed_limit", "off_map_penalty"),
+    *("map_side", "altitude", "eavesdropper_altitude", "helper_mass"),
+)
+_TASKS = (
+    *("coverage_radius", "min_secrecy_rate", "task_size", "cycles_per_bit", "capacitance"),
+    *("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"),
+)
 
 CHOICES = {"speed_limit": ("box", "disc")}
 
 FIELDS = {field.name: field for field in dataclasses.fields(Scenario)}
+
+_RADIO = tuple(name for name in FIELDS if name not in (*NODES, "ue_positions", *_FLIGHT, *_TASKS))
+
+GROUPS = {"Flight": _FLIGHT, "Radio": _RADIO, "Tasks": _TASKS}
+"""All parameters but the positions; what has no other group is of the radio."""
 
 KINDS: dict[str, Any] = typing.get_type_hints(Scenario)
 

@@ -10,8 +10,8 @@ from hyuav._support.errors import InputError
 from hyuav.experiments.evaluation import OPTIMA, Evaluation
 from hyuav.experiments.experiment import LEARNED
 from hyuav.experiments.run_directory import named_scenario
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
-from hyuav.physics.slot import SCHEMES
 from hyuav.viz.dashboard import draft as drafts
 from hyuav.viz.dashboard.draft_widgets import editor, place
 from hyuav.viz.dashboard.flights_page import player
@@ -148,7 +148,7 @@ def _save(root: Path, scenario: Scenario) -> None:
 def _explore(index: RunIndex, scenario: Scenario) -> Evaluation | None:
     """The map of the scenario with the flights, and what they bring."""
     first, second = st.columns(2)
-    rule = first.radio("Mode chosen by", SCHEMES, key="rule", horizontal=True)
+    rule = first.radio("Mode chosen by", MODE_RULES, key="rule", horizontal=True)
     mapped = second.radio(
         "Map", list(QUANTITIES), format_func=QUANTITIES.__getitem__, key="mapped", horizontal=True
     )

@@ -13,7 +13,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.learning.cohort import Learner
 from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve
+from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve_optimum
 from hyuav.viz.dashboard.index import RunIndex, Stamp
 
 MOST_SLOTS, MOST_UES = 500, 200
@@ -90,7 +90,8 @@ def optimum(scenario: Scenario, rule: str, *, fine: bool) -> Optimum:
     """
     spacing = resolution(scenario, fine=fine)
     draws = FINE_DRAWS if fine else COARSE_DRAWS
-    return solve(scenario, [rule], resolution=spacing, draws=draws, evaluation_draws=2000)[rule]
+    options = {"resolution": spacing, "draws": draws, "evaluation_draws": 2000}
+    return solve_optimum(scenario, [rule], **options)[rule]
 
 
 @lru_cache(maxsize=128)

@@ -11,9 +11,10 @@ import torch
 from numpy.typing import NDArray
 
 from hyuav.envs.rendering import HELPER_COLOR
-from hyuav.physics.offloading import prefers_relay
+from hyuav.physics.offloading import ModeRule
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Control, Physics, slot
+from hyuav.physics.tasks import mean_tasks
 from hyuav.viz.data.maps import Mode
 from hyuav.viz.html.maps import sum_rate_map
 from hyuav.viz.html.style import scheme_color, scheme_label
@@ -97,17 +98,13 @@ def offloading_counts(scenario: Scenario, rule: str, resolution: float) -> NDArr
     """
     half = scenario.map_side / 2
     across = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64)
-    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
+    physics = Physics(scenario, dtype=torch.float64)
     y, x = torch.meshgrid(across, across, indexing="ij")
-    distances = system.distances(torch.stack([x, y], dim=-1))
-    tasks = system.mean_tasks(tuple(x.shape)) if system.edge_can_saturate else None
-    gains = system.channel_gains(distances, None)
-    relay = system.relay_outcome(distances, gains, tasks)
-    jamming = system.jamming_outcome(gains, tasks)
-    relaying = relay.offloading.expand(*x.shape, -1).sum(dim=-1)
-    jammed = jamming.offloading.expand(*x.shape, -1).sum(dim=-1)
-    better = torch.where(prefers_relay(relay.sum_rate, jamming.sum_rate), relaying, jammed)
-    return {"hybrid": better, "relay": relaying, "jamming": jammed}[rule].numpy()
+    positions = torch.stack([x, y], dim=-1).unsqueeze(-2)
+    hovering = Control(torch.zeros_like(positions), ModeRule.of([rule]))
+    nodes = physics.nodes._replace(helper=positions)
+    over = slot(physics, nodes, hovering, tasks=mean_tasks(scenario, torch.float64))
+    return over.offloading.sum(dim=-1).numpy()
 
 
 def _colorbar(title: str) -> dict[str, Any]:

@@ -7,7 +7,8 @@ import torch
 from numpy.typing import NDArray
 
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Control, Physics, slot
+from hyuav.physics.tasks import mean_tasks
 
 Mode = Literal["relay", "jamming", "better"]
 """The helper's mode on a map; ``better`` is the one that brings more at each position."""
@@ -44,8 +45,9 @@ def sum_rates_over_map(scenario: Scenario, resolution: float = 1.0) -> SumRateMa
     """
     half = scenario.map_side / 2
     axis = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64)
-    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
-    positions = torch.cartesian_prod(axis, axis).reshape(len(axis), len(axis), 2)
-    tasks = system.mean_tasks(positions.shape[:-1]) if system.edge_can_saturate else None
-    relay, jamming = (rates.T.numpy() for rates in system.sum_rates(positions, tasks=tasks))
+    physics = Physics(scenario, dtype=torch.float64)
+    positions = torch.cartesian_prod(axis, axis).reshape(len(axis), len(axis), 1, 2)
+    nodes, hovering = physics.nodes._replace(helper=positions), Control(torch.zeros_like(positions))
+    over = slot(physics, nodes, hovering, tasks=mean_tasks(scenario, torch.float64))
+    relay, jamming = (mode.sum_rate.T.numpy() for mode in (over.relay, over.jamming))
     return SumRateMap(axis.numpy(), relay, jamming)
