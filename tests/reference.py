@@ -89,7 +89,8 @@ def gains(s: Scenario, helper: Numbers, fading: Numbers | None) -> Gains:
     power = [1.0] * (3 * count + 2) if fading is None else list(fading)
 
     def ground(u: int, node: Numbers, height: float) -> float:
-        return s.ground_to_air_gain / (height**2 + distance(s.ue_positions[u], node) ** 2)
+        length = math.hypot(height, distance(s.ue_positions[u], node))
+        return s.ground_to_air_gain / length**s.ground_to_air_exponent
 
     to_legitimate = max(distance(helper, s.legitimate_position), 1.0)
     to_eavesdropper = distance(helper, s.eavesdropper_positions[0])

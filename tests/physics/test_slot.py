@@ -372,6 +372,20 @@ def test_single_and_double_precision_agree() -> None:
         assert int((~close).sum()) <= 2
 
 
+@pytest.mark.parametrize("exponent", [0.0, 1.7, 2.0, 2.8, 4.0])
+def test_the_path_loss_exponent_of_the_ues_links_is_that_of_scalar_loops(exponent: float) -> None:
+    scenario = dataclasses.replace(
+        without_fading("two_clusters"), ground_to_air_exponent=exponent, ground_to_air_gain=1e-4
+    )
+    physics, helper = double(scenario), (-49.0, 6.0)
+    found, expected = geometry(physics, helper).gains, reference.gains(scenario, helper, None)
+    assert reference.as_list(found.ue_legitimate) == pytest.approx(expected.g_ul, rel=1e-12)
+    assert reference.as_list(found.ue_helper) == pytest.approx(expected.g_uh, rel=1e-12)
+    assert reference.as_list(found.ue_eavesdropper) == pytest.approx(expected.g_ue, rel=1e-12)
+    assert float(found.helper_legitimate) == pytest.approx(expected.g_hl, rel=1e-12)
+    assert Scenario.preset("two_clusters").ground_to_air_exponent == 2.0
+
+
 def test_a_helper_above_l_receives_the_gain_at_the_reference_distance() -> None:
     physics = double(without_fading("two_clusters"))
     at = [[x, 0.0] for x in (0.0, 0.5, 1.0, 2.0)]

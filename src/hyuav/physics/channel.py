@@ -95,8 +95,10 @@ def horizontal_distance(position: Tensor, other: Tensor) -> Tensor:
     return distance
 
 
-def path_gain(distance: Tensor, height_difference: float, reference_gain: float) -> Tensor:
-    """Path power gain beta / (h^2 + D^2): the first factor of eq. 3 and of eq. 4.
+def path_gain(
+    distance: Tensor, height_difference: float, reference_gain: float, exponent: float = 2.0
+) -> Tensor:
+    """Path power gain beta / (h^2 + D^2)^(alpha / 2): the first factor of eq. 3 and of eq. 4.
 
     The squared distance is clamped below by d_0^2, so that the gain stays finite where the
     helper flies straight above another UAV at its own altitude.
@@ -105,17 +107,20 @@ def path_gain(distance: Tensor, height_difference: float, reference_gain: float)
         distance: (...) horizontal distance in m.
         height_difference: in m.
         reference_gain: beta_0 or beta_1, the gain at d_0.
+        exponent: alpha; 2 in free space, as in the paper.
 
     Returns:
         (...) dimensionless.
     """
-    squared = distance.square() + height_difference**2
-    return squared.clamp(min=REFERENCE_DISTANCE**2).reciprocal() * reference_gain
+    squared = (distance.square() + height_difference**2).clamp(min=REFERENCE_DISTANCE**2)
+    loss = squared if exponent == 2.0 else squared.pow(exponent / 2)
+    return loss.reciprocal() * reference_gain
 
 
 def ground_to_air(scenario: Scenario, distance: Tensor, height_difference: float) -> Tensor:
     """Path gain of a UE's link to a UAV (eq. 3 without fading); as :func:`path_gain`."""
-    return path_gain(distance, height_difference, scenario.ground_to_air_gain)
+    gain, exponent = scenario.ground_to_air_gain, scenario.ground_to_air_exponent
+    return path_gain(distance, height_difference, gain, exponent)
 
 
 def air_to_air(scenario: Scenario, distance: Tensor, height_difference: float) -> Tensor:
