@@ -4,6 +4,7 @@ import numpy as np
 
 from benchmarks.numpy_environment import NumpyEnv
 from benchmarks.work import Work
+from hyuav.physics.channel import LinkRow
 
 
 class NumpyFlights:
@@ -90,6 +91,6 @@ class RandomNumbers(TorchFlights):
 
     def fly(self) -> None:
         """The draws of one episode of the batch."""
-        shape = (2, self.width, 3 * self.work.scenario.num_ues + 2)
+        shape = (2, self.width, LinkRow.of(self.work.scenario).size)
         for _ in range(self.slots):
             self.torch.randn(shape, generator=self.generator, device=self.generator.device)

@@ -41,7 +41,7 @@ class NumpyEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._norm_limit = self._longest_flight()
         self._prepare_channels()
         self._prepare_modes()
-        self.start = scenario.helper_start
+        self.start = scenario.helper_starts[0]
         self.slots = 0
         self.x, self.y = self.start
         self.relay = False
@@ -66,7 +66,7 @@ class NumpyEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         Those that do not depend on the helper's position are filled in once.
         """
         s, count = self.scenario, self.scenario.num_ues
-        nodes = [*s.ue_positions, s.legitimate_position, s.eavesdropper_position]
+        nodes = [*s.ue_positions, s.legitimate_position, s.eavesdropper_positions[0]]
         self._node_x, self._node_y = np.array(nodes).T.copy()
         climb = s.altitude - s.eavesdropper_altitude
         self._heights = np.array([s.altitude**2] * count + [0.0, climb**2])
@@ -75,7 +75,7 @@ class NumpyEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._means = np.empty(3 * count + 2)
         ues = np.array(s.ue_positions)
         self._ue_to_legitimate = np.hypot(*(ues - s.legitimate_position).T)
-        to_eavesdropper = np.hypot(*(ues - s.eavesdropper_position).T)
+        to_eavesdropper = np.hypot(*(ues - s.eavesdropper_positions[0]).T)
         ground = np.maximum(self._ue_to_legitimate**2 + s.altitude**2, 1.0)
         above = np.maximum(to_eavesdropper**2 + s.eavesdropper_altitude**2, 1.0)
         self._means[:count], self._means[2 * count : 3 * count] = ue_snr / ground, ue_snr / above

@@ -9,7 +9,7 @@ from hyuav.experiments.schemes import LEARNED
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.weights import copy_weights, draw_weights
-from hyuav.references.optimum import solve
+from hyuav.references.optimum import solve_optimum
 
 
 class FiveSchemes:
@@ -55,4 +55,4 @@ class Optima:
 
     def advance(self) -> int:
         """Solve once."""
-        return len(solve(self.scenario)) * self.scenario.num_slots
+        return len(solve_optimum(self.scenario)) * self.scenario.num_slots

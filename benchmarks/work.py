@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
+from hyuav.envs.observation import ObservationLayout
 from hyuav.physics.scenario import Scenario
 
 SLOTS_AT_A_TIME = 100
@@ -45,8 +46,8 @@ class Work:
 
     @property
     def observation_size(self) -> int:
-        """U + 5."""
-        return self.scenario.num_ues + 5
+        """Numbers of an observation."""
+        return ObservationLayout(self.scenario, clock=False).size
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""

@@ -48,8 +48,8 @@ from hyuav.experiments.train import train_or_resume
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
-from hyuav.physics.slot import SCHEMES
 from hyuav.references.optimum import require_resolution
 from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
 from hyuav.viz.html.page import write_report
@@ -216,7 +216,7 @@ def _other_horizons(scenario: Scenario, options: Reproduce) -> list[int]:
 def _learners(options: Reproduce, seeds: int | None) -> tuple[Learner, ...]:
     """So many of each scheme."""
     several = range(options.seed, options.seed + (seeds or options.seeds))
-    return tuple(Learner(scheme, seed) for scheme in SCHEMES for seed in several)
+    return tuple(Learner(scheme, seed) for scheme in MODE_RULES for seed in several)
 
 
 def _over_horizons(

@@ -43,7 +43,7 @@ from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train_or_resume
 from hyuav.learning.cohort import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.physics.slot import SCHEMES
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.viz.html.page import write_report
 
 
@@ -51,7 +51,7 @@ from hyuav.viz.html.page import write_report
 class Train(Parameters):
     """What to train, besides the scenario, the algorithm and its training."""
 
-    scheme: tuple[str, ...] = parameter(one_or_more(choice(*SCHEMES), "schemes"), ("hybrid",))
+    scheme: tuple[str, ...] = parameter(one_or_more(choice(*MODE_RULES), "schemes"), ("hybrid",))
     num_slots: tuple[int, ...] | None = parameter(
         optional(one_or_more(count(), "numbers of slots")), None
     )

@@ -15,7 +15,7 @@ from hypothesis import settings
 import hyuav  # noqa: F401 - registers the environments
 from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
-from hyuav.references.optimum import FlightPolicy, solve
+from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 from recipe_calls import Call, Refusal
 
@@ -64,7 +64,7 @@ def scenario() -> Scenario:
 @pytest.fixture(scope="session")
 def evaluation(scenario: Scenario) -> Evaluation:
     """The straight flights and the optima; the hybrid optimum is flown as Proposed too."""
-    optima = solve(scenario, resolution=5.0)
+    optima = solve_optimum(scenario, resolution=5.0)
     best = {rule: [Policy(FlightPolicy(found.path, scenario))] for rule, found in optima.items()}
     policies = {
         "re_lt": [Policy(re_lt(scenario))],

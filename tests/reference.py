@@ -17,6 +17,10 @@ from numpy.typing import NDArray
 from tensordict import TensorDict
 
 from hyuav import Scenario
+from hyuav.physics import slot as package
+from hyuav.physics.layout import Nodes
+from hyuav.physics.slot import Control, Physics, SlotOutcome
+from hyuav.physics.tasks import Tasks
 
 RELAY, JAMMING = 1, 0
 
@@ -75,7 +79,7 @@ def distance(a: Numbers, b: Numbers) -> float:
 
 
 def distances(s: Scenario, helper: Numbers) -> list[float]:
-    nodes = [*s.ue_positions, s.legitimate_position, s.eavesdropper_position]
+    nodes = [*s.ue_positions, s.legitimate_position, s.eavesdropper_positions[0]]
     return [distance(helper, node) for node in nodes]
 
 
@@ -85,16 +89,17 @@ def gains(s: Scenario, helper: Numbers, fading: Numbers | None) -> Gains:
     power = [1.0] * (3 * count + 2) if fading is None else list(fading)
 
     def ground(u: int, node: Numbers, height: float) -> float:
-        return s.ground_to_air_gain / (height**2 + distance(s.ue_positions[u], node) ** 2)
+        length = math.hypot(height, distance(s.ue_positions[u], node))
+        return s.ground_to_air_gain / length**s.ground_to_air_exponent
 
     to_legitimate = max(distance(helper, s.legitimate_position), 1.0)
-    to_eavesdropper = distance(helper, s.eavesdropper_position)
+    to_eavesdropper = distance(helper, s.eavesdropper_positions[0])
     climb = s.altitude - s.eavesdropper_altitude
     return Gains(
         g_ul=[ground(u, s.legitimate_position, s.altitude) * power[u] for u in range(count)],
         g_uh=[ground(u, helper, s.altitude) * power[count + u] for u in range(count)],
         g_ue=[
-            ground(u, s.eavesdropper_position, s.eavesdropper_altitude) * power[2 * count + u]
+            ground(u, s.eavesdropper_positions[0], s.eavesdropper_altitude) * power[2 * count + u]
             for u in range(count)
         ],
         g_hl=s.air_to_air_gain / to_legitimate**2 * power[3 * count],
@@ -267,8 +272,8 @@ def scenarios(draw: st.DrawFn, fading: bool | None = None) -> Scenario:
     values: dict[str, Any] = {
         "ue_positions": ues,
         "legitimate_position": legitimate,
-        "eavesdropper_position": draw(coordinates(half)),
-        "helper_start": draw(coordinates(half)),
+        "eavesdropper_positions": draw(coordinates(half)),
+        "helper_starts": draw(coordinates(half)),
         "num_slots": draw(st.integers(1, 50)),
         "slot_duration": slot_duration,
         "map_side": map_side,
@@ -315,7 +320,7 @@ def helpers(draw: st.DrawFn, scenario: Scenario) -> tuple[float, float]:
     target = draw(st.sampled_from(["anywhere", "UEs", "E"]))
     if target == "anywhere":
         return x, y
-    around = scenario.eavesdropper_position if target == "E" else scenario.ue_positions[0]
+    around = scenario.eavesdropper_positions[0] if target == "E" else scenario.ue_positions[0]
     near = (around[0] + x / 16, around[1] + y / 16)
     return min(max(near[0], -half), half), min(max(near[1], -half), half)
 
@@ -336,15 +341,41 @@ def changed(scenario: Scenario, **changes: Any) -> Scenario:
 
 
 def start_at(env: Any, position: Any) -> Any:
-    """Reset the environment with its helpers at ``position``."""
-    position = torch.as_tensor(position, dtype=torch.float32)
+    """Reset the environment with one helper in each row, at ``position`` (*batch_size, 2)."""
+    position = torch.as_tensor(position, dtype=torch.float32).unsqueeze(-2)
     return env.reset(TensorDict({"position": position}, batch_size=env.batch_size))
 
 
 def fly(env: Any, state: Any, action: Any) -> Any:
     """What the next slot brings, physical entries and diagnostics."""
     action = torch.as_tensor(action, dtype=torch.float32).expand(*env.batch_size, 2)
+    action = action.reshape(env.action_spec.shape)  # with the helper's axis where it has one
     return env.step(state.clone().set("action", action))["next"]
+
+
+def with_helper(physics: Physics, position: Any) -> Nodes:
+    """The scenario's nodes with the helper at (..., 2) m."""
+    position = torch.as_tensor(position, dtype=physics.dtype)
+    return physics.nodes._replace(helper=position.unsqueeze(-2))
+
+
+def hover(
+    physics: Physics,
+    position: Any,
+    fading: torch.Tensor | None = None,
+    tasks: Tasks | None = None,
+    **control: Any,
+) -> SlotOutcome:
+    """A slot of the package with the helper at (..., 2) m; the fading comes in rows."""
+    links = None if fading is None else physics.link_row.unflatten(fading)
+    staying = Control(torch.zeros(1, 2, dtype=physics.dtype), **control)
+    return package.slot(physics, with_helper(physics, position), staying, links, tasks)
+
+
+def place(entries: Any) -> torch.Tensor:
+    """Where the one helper of each row is: (..., 2) m."""
+    position: torch.Tensor = entries["position"]
+    return position.squeeze(-2)
 
 
 def next_draws(env: Any) -> tuple[list[list[float] | None], list[list[float]]]:

@@ -24,7 +24,7 @@ from hyuav.physics.scenario import PRESETS, Scenario
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 
-_GREEK = "beta|gamma|Delta|epsilon|kappa|sigma|tau"
+_GREEK = "alpha|beta|gamma|Delta|epsilon|kappa|sigma|tau"
 
 
 def recipes_page() -> str:

@@ -257,7 +257,7 @@ def test_a_truncated_file_is_refused(tmp_path: Path) -> None:
     TWO_CLUSTERS.save(file)
     whole = file.read_text()
     # Without the end of the last number, or within a name, or within a list.
-    for cut in (whole.index("helper_start") + 6, whole.index("ue_positions") + 3, 0):
+    for cut in (whole.index("helper_starts") + 6, whole.index("ue_positions") + 3, 0):
         file.write_text(whole[:cut])
         with pytest.raises(InputError):
             Scenario.load(file)

@@ -12,7 +12,9 @@ import reference
 from benchmarks.numpy_environment import NumpyEnv
 from hyuav import Scenario, make_env
 from hyuav.physics.channel import rician_power
-from hyuav.physics.slot import SCHEMES, SecureOffloadingSystem
+from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.slot import Physics
+from hyuav.physics.tasks import draw_tasks
 from reference import changed, random_actions, torchrl_flight
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
@@ -26,7 +28,7 @@ def slot_of_the_model(
     return flown, reference.slot(scenario, scheme, flown.position, fading, cycles)
 
 
-@given(st.data(), reference.scenarios(), st.sampled_from(SCHEMES), st.integers(0, 2**31))
+@given(st.data(), reference.scenarios(), st.sampled_from(MODE_RULES), st.integers(0, 2**31))
 def test_a_slot_is_the_models_slot_in_any_world(
     data: st.DataObject, scenario: Scenario, scheme: str, seed: int
 ) -> None:
@@ -54,7 +56,7 @@ def test_a_slot_is_the_models_slot_in_any_world(
 
 
 @pytest.mark.parametrize("scenario", [TWO_CLUSTERS, RANDOM_DISK], ids=["clusters", "disk"])
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", MODE_RULES)
 def test_flights_without_fading_are_those_of_the_learners_environment(
     scenario: Scenario, scheme: str
 ) -> None:
@@ -71,18 +73,19 @@ def test_flights_without_fading_are_those_of_the_learners_environment(
             assert truncated == slot["truncated"][row].item()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_sum_rates_are_those_of_the_system_at_the_same_draws(scheme: str) -> None:
-    system = SecureOffloadingSystem(RANDOM_DISK, dtype=torch.float64)
+@pytest.mark.parametrize("scheme", MODE_RULES)
+def test_sum_rates_are_those_of_the_physics_at_the_same_draws(scheme: str) -> None:
+    physics = Physics(RANDOM_DISK, dtype=torch.float64)
     generator = torch.Generator().manual_seed(3)
     env = NumpyEnv(RANDOM_DISK, scheme)
     for _ in range(200):
         position = 200 * torch.rand(2, generator=generator, dtype=torch.float64) - 100
-        fading = system.draw_fading((), generator)
+        fading = physics.draw_fading((), generator)
         assert fading is not None
         env.draw_fading = fading.numpy  # type: ignore[method-assign]
         env.x, env.y = position.tolist()
-        relay, jamming = (rate.item() for rate in system.sum_rates(position, fading))
+        slot = reference.hover(physics, position, fading)
+        relay, jamming = slot.relay.sum_rate.item(), slot.jamming.sum_rate.item()
         chosen = {"hybrid": max(relay, jamming), "relay": relay, "jamming": jamming}
         rate, _ = env._slot()
         assert rate == pytest.approx(chosen[scheme], abs=1e-9)
@@ -92,8 +95,8 @@ def test_sum_rates_are_those_of_the_system_at_the_same_draws(scheme: str) -> Non
 def test_its_fading_follows_the_models_law() -> None:
     env, draws = NumpyEnv(TWO_CLUSTERS, seed=1), 20_000
     own = np.stack([np.copy(env.draw_fading()) for _ in range(draws)])  # type: ignore[arg-type]
-    system = SecureOffloadingSystem(TWO_CLUSTERS, dtype=torch.float64)
-    model = rician_power(system._k_factor, (draws, 32), torch.Generator().manual_seed(2)).numpy()
+    physics = Physics(TWO_CLUSTERS, dtype=torch.float64)
+    model = rician_power(physics.k_factor, (draws, 32), torch.Generator().manual_seed(2)).numpy()
     np.testing.assert_allclose(own.mean(0), 1.0, atol=0.015)
     np.testing.assert_allclose(own.mean(0), model.mean(0), atol=0.02)
     np.testing.assert_allclose(own.std(0), model.std(0), rtol=0.06)
@@ -104,8 +107,8 @@ def test_its_fading_follows_the_models_law() -> None:
 def test_its_tasks_follow_the_models_law() -> None:
     env = NumpyEnv(TWO_CLUSTERS, seed=1)
     own = np.stack([env.draw_cycles() for _ in range(5000)])
-    system = SecureOffloadingSystem(TWO_CLUSTERS, dtype=torch.float64)
-    model = system.draw_tasks((5000,), torch.Generator().manual_seed(2)).cpu_cycles.numpy()
+    tasks = draw_tasks(TWO_CLUSTERS, (5000,), torch.Generator().manual_seed(2), torch.float64)
+    model = tasks.cpu_cycles.numpy()
     assert own.mean() == pytest.approx(model.mean(), rel=0.01)
     assert own.std() == pytest.approx(model.std(), rel=0.03)
 

@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDictBase
 
 from hyuav import InputError, Scenario, make_env
-from hyuav.physics.slot import SCHEMES
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.references.straight import ConstantVelocity
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
@@ -26,12 +26,14 @@ def both_flights(scenario: Scenario, **options: Any) -> tuple[TensorDictBase, Te
     generator = torch.Generator().manual_seed(0)
     envs = [make_env(scenario, compiled=fast, **options) for fast in (False, True)]
     shape = (*envs[0].batch_size, 2)
-    start = (torch.rand(shape, generator=generator) - 0.5) * scenario.map_side
+    start = (torch.rand(shape, generator=generator) - 0.5).unsqueeze(-2) * scenario.map_side
     actions = [3 * torch.rand(shape, generator=generator) - 1.5 for _ in range(6)]
     flights, resets = [], dict[str, TensorDictBase]()
     for env in envs:
         state, slots = (
-            env.reset(env.fake_tensordict().select("position").set_("position", start)),
+            env.reset(
+                env.fake_tensordict().select("position").set_("position", start.unsqueeze(-2))
+            ),
             [],
         )
         for action in actions:
@@ -65,7 +67,7 @@ def test_compiled_slots_are_those_of_the_eager_environment() -> None:
 def test_a_scheme_and_a_seed_for_each_row_a_full_edge_and_a_disc_compile_too() -> None:
     eager, fast = both_flights(
         FULL_EDGE,
-        scheme=[SCHEMES[row % 3] for row in SIXTY],
+        scheme=[MODE_RULES[row % 3] for row in SIXTY],
         batch_size=(60, 4),
         seed=[row // 2 for row in SIXTY],
         diagnostics=True,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from hyuav import Scenario, SecureOffloadingEnv
-from hyuav.physics.slot import SCHEMES
+from hyuav.physics.offloading import MODE_RULES
 
 RANDOM_DISK = Scenario.preset("random_disk")
 QUIET = dataclasses.replace(RANDOM_DISK, fading=False)
@@ -23,18 +23,18 @@ def flights(scenario: Scenario, scheme: str, seed: int, rows: int = 64) -> Any:
     generator = torch.Generator().manual_seed(seed)
     state = env.reset(
         TensorDict(
-            {"position": 200 * torch.rand(rows, 2, generator=generator) - 100}, batch_size=rows
+            {"position": 200 * torch.rand(rows, 1, 2, generator=generator) - 100}, batch_size=rows
         )
     )
     slots = []
     for _ in range(2):
-        action = 2 * torch.rand(rows, 2, generator=generator) - 1
+        action = 2 * torch.rand(rows, 1, 2, generator=generator) - 1
         state = env.step(state.clone().set("action", action))["next"]
         slots.append(state)
     return slots
 
 
-@given(SEEDS, st.sampled_from(SCHEMES))
+@given(SEEDS, st.sampled_from(MODE_RULES))
 def test_the_reward_is_the_sum_of_the_secrecy_rates_of_the_offloading_ues(
     seed: int, scheme: str
 ) -> None:
@@ -45,14 +45,14 @@ def test_the_reward_is_the_sum_of_the_secrecy_rates_of_the_offloading_ues(
     assert not details["secrecy_rate"][~details["offloading"]].any()
 
 
-@given(SEEDS, st.sampled_from(SCHEMES))
+@given(SEEDS, st.sampled_from(MODE_RULES))
 def test_a_ue_outside_the_coverage_never_offloads(seed: int, scheme: str) -> None:
     scenario = dataclasses.replace(RANDOM_DISK, coverage_radius=30.0)
     slot = flights(scenario, scheme, seed)[0]
     to_legitimate = torch.tensor(scenario.ue_positions).norm(dim=-1)
     offloading = slot["diagnostics", "offloading"]
     assert not offloading[:, to_legitimate > 30.0].any()
-    beyond_helper = (slot["distances"][:, :10] > 30.0) & (slot["mode"] == 1)
+    beyond_helper = (slot["distances"][:, 0, :10] > 30.0) & (slot["mode"] == 1)
     assert not (offloading & beyond_helper).any()
 
 
@@ -68,7 +68,7 @@ def test_what_a_ue_spends_is_sending_or_computing() -> None:
     assert local.unique().numel() > local.numel() // 2
 
 
-@given(SEEDS, st.sampled_from(SCHEMES))
+@given(SEEDS, st.sampled_from(MODE_RULES))
 def test_the_load_taken_in_one_slot_is_computed_in_the_next(seed: int, scheme: str) -> None:
     first, second = (slot["diagnostics"] for slot in flights(RANDOM_DISK, scheme, seed))
     assert not first["edge_energy"].any()
@@ -82,9 +82,9 @@ def test_the_load_taken_in_one_slot_is_computed_in_the_next(seed: int, scheme: s
 
 def test_relaying_costs_energy_only_for_the_ues_that_offload() -> None:
     env = SecureOffloadingEnv(QUIET, "relay", 2, seed=0, diagnostics=True)
-    position = torch.tensor([[-20.0, -20.0], [100.0, 100.0]])
+    position = torch.tensor([[[-20.0, -20.0]], [[100.0, 100.0]]])
     state = env.reset(TensorDict({"position": position}, batch_size=2))
-    state = env.step(state.set("action", torch.zeros(2, 2)))["next"]
+    state = env.step(state.set("action", torch.zeros(2, 1, 2)))["next"]
     assert state["diagnostics", "offloading"].sum(-1).tolist() == [5, 0]
     spent = state["diagnostics", "helper_energy"].flatten().tolist()
     assert spent == pytest.approx([5 * 0.012 / 20, 0.0])
@@ -92,12 +92,12 @@ def test_relaying_costs_energy_only_for_the_ues_that_offload() -> None:
 
 def test_jamming_costs_energy_even_if_nobody_offloads() -> None:
     env = SecureOffloadingEnv(QUIET, "jamming", seed=0, diagnostics=True)
-    state = env.step(env.reset().set("action", torch.zeros(2)))["next"]
+    state = env.step(env.reset().set("action", torch.zeros(1, 2)))["next"]
     assert not state["diagnostics", "offloading"].any()
     assert float(state["diagnostics", "helper_energy"]) == pytest.approx(0.08)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", MODE_RULES)
 def test_both_modes_are_reported_whichever_is_chosen(scheme: str) -> None:
     slot = flights(RANDOM_DISK, scheme, 3)[0]
     relay, jamming = slot["diagnostics", "relay_sum_rate"], slot["diagnostics", "jamming_sum_rate"]
@@ -130,7 +130,7 @@ def test_a_load_beyond_the_edges_budget_is_counted() -> None:
     for load, violations in ((2.8e9, 0), (2.9e9, 1)):  # 21.95 J and 24.39 J
         state = env.reset()
         state["diagnostics", "edge_load"] = torch.tensor([load])
-        state = env.step(state.set("action", torch.zeros(2)))["next"]
+        state = env.step(state.set("action", torch.zeros(1, 2)))["next"]
         assert float(state["diagnostics", "edge_energy"]) == pytest.approx(
             1e-27 * load**3, rel=1e-5
         )

@@ -19,14 +19,17 @@ from hypothesis import strategies as st
 from stable_baselines3.common import env_checker
 
 from hyuav import InputError, Scenario, make_env
-from reference import random_actions, torchrl_flight
+from reference import place, random_actions, torchrl_flight
 
 Build = Callable[..., Any]
 
 SCENARIO = Scenario.preset("two_clusters")
 SHORT = dataclasses.replace(SCENARIO, num_slots=3)
 CORNER_TO_CORNER = dataclasses.replace(
-    SCENARIO, map_side=150.1, helper_start=(75.05, -75.05), eavesdropper_position=(-75.05, 75.05)
+    SCENARIO,
+    map_side=150.1,
+    helper_starts=(75.05, -75.05),
+    eavesdropper_positions=(-75.05, 75.05),
 )
 """The eavesdropper is as far away as can be, and float32 rounds the distance up."""
 
@@ -71,7 +74,7 @@ def test_a_flight_is_that_of_the_torchrl_environment_with_the_same_seed(
         assert reward == slot["reward"].item()
         assert terminated is False
         assert truncated is slot["truncated"].item()
-        np.testing.assert_array_equal(info["position"], slot["position"])
+        np.testing.assert_array_equal(info["position"], place(slot))
         assert info["mode"] == slot["mode"].item()
         assert info["off_map"] is slot["off_map"].item()
 
@@ -106,11 +109,11 @@ def test_nothing_is_earned_before_the_first_slot(make: Build) -> None:
 
 def test_a_reset_starts_at_helper_start_or_where_it_is_told(make: Build) -> None:
     env = make()
-    assert tuple(env.reset(seed=0)[1]["position"]) == SCENARIO.helper_start
+    assert tuple(env.reset(seed=0)[1]["position"]) == SCENARIO.helper_starts[0]
     observation, info = env.reset(options={"position": (25, -50.0)})
     assert tuple(info["position"]) == (25.0, -50.0)
     np.testing.assert_allclose(observation[:2], (0.25, -0.5))
-    assert tuple(env.reset()[1]["position"]) == SCENARIO.helper_start
+    assert tuple(env.reset()[1]["position"]) == SCENARIO.helper_starts[0]
 
 
 def test_without_a_seed_the_random_numbers_go_on(make: Build) -> None:

@@ -10,7 +10,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from hyuav import InputError, Scenario, make_env
-from reference import random_actions, torchrl_flight
+from reference import place, random_actions, torchrl_flight
 
 Build = Callable[..., Any]
 
@@ -57,7 +57,7 @@ def test_a_batch_flies_as_the_torchrl_environment_of_that_batch_size(make_vec: B
         np.testing.assert_array_equal(reward, slot["reward"].squeeze(-1))
         np.testing.assert_array_equal(truncated, slot["truncated"].squeeze(-1))
         assert not terminated.any()
-        np.testing.assert_array_equal(info["position"], slot["position"])
+        np.testing.assert_array_equal(info["position"], place(slot))
         np.testing.assert_array_equal(info["mode"], slot["mode"].squeeze(-1))
         np.testing.assert_array_equal(info["off_map"], slot["off_map"].squeeze(-1))
     assert truncated.all()
@@ -134,7 +134,7 @@ def test_gymnasium_s_own_wrappers_understand_the_batch(make_vec: Build) -> None:
         earned += reward
     assert [info["episode"]["l"] for info in infos] == [SHORT.num_slots] * 2
     np.testing.assert_allclose([info["episode"]["r"] for info in infos], earned)
-    assert tuple(infos[0]["position"]) == SCENARIO.helper_start
+    assert tuple(infos[0]["position"]) == SCENARIO.helper_starts[0]
 
 
 def test_each_row_may_fly_its_own_scheme(make_vec: Build) -> None:

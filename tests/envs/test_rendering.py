@@ -81,7 +81,7 @@ def test_the_map_shows_every_node_and_the_coverage_of_the_legitimate_uav(axes: A
     drawn = {line.get_label(): line.get_xydata() for line in axes.lines}
     np.testing.assert_array_equal(drawn["UE"], SCENARIO.ue_positions)
     np.testing.assert_array_equal(drawn["legitimate UAV (L)"], [SCENARIO.legitimate_position])
-    np.testing.assert_array_equal(drawn["eavesdropper (E)"], [SCENARIO.eavesdropper_position])
+    np.testing.assert_array_equal(drawn["eavesdropper (E)"], [SCENARIO.eavesdropper_positions[0]])
     (disk,) = [patch for patch in axes.patches if isinstance(patch, Circle)]
     assert disk.get_radius() == SCENARIO.coverage_radius
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import reference
 from hyuav import Scenario, SecureOffloadingEnv
-from hyuav.physics.slot import SCHEMES
-from reference import changed, fly, next_draws, start_at
+from hyuav.physics.offloading import MODE_RULES
+from reference import assert_same, changed, fly, next_draws, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
 RANDOM_DISK = Scenario.preset("random_disk")
@@ -23,20 +23,20 @@ ROWS = 4
 def test_every_slot_is_that_of_scalar_loops(
     scenario: Scenario, data: st.DataObject, seed: int
 ) -> None:
-    schemes = data.draw(st.lists(st.sampled_from(SCHEMES), min_size=ROWS, max_size=ROWS))
+    schemes = data.draw(st.lists(st.sampled_from(MODE_RULES), min_size=ROWS, max_size=ROWS))
     start = data.draw(st.lists(reference.helpers(scenario), min_size=ROWS, max_size=ROWS))
     env = SecureOffloadingEnv(scenario, schemes, (ROWS,), seed=seed, diagnostics=True)
     powers, cycles = next_draws(env)
     state = start_at(env, start)
     edge_load = [0.0] * ROWS
     for row in range(ROWS):
-        helper = reference.as_list(state["position"][row])
+        helper = reference.as_list(place(state)[row])
         slot = reference.slot(scenario, schemes[row], helper, powers[row], cycles[row])
         assume(slot.margin > 1e-4)
         assert state["mode"][row].item() == slot.mode
     for _ in range(3):
         action = data.draw(st.lists(reference.actions(), min_size=ROWS, max_size=ROWS))
-        before = [reference.as_list(position) for position in state["position"]]
+        before = [reference.as_list(position) for position in place(state)]
         powers, cycles = next_draws(env)
         state = fly(env, state, action)
         for row in range(ROWS):
@@ -62,8 +62,8 @@ def compare(
     length: dict[str, Any] = {"rel": 1e-5, "abs": 1e-6 * scenario.map_side}
     rate: dict[str, Any] = {"rel": 1e-4, "abs": 2e-4}
     assert found["off_map"].item() == flight.off_map
-    assert found["position"].tolist() == pytest.approx(flight.position, **length)
-    assert found["distances"].tolist() == pytest.approx(
+    assert place(found).tolist() == pytest.approx(flight.position, **length)
+    assert found["distances"][0].tolist() == pytest.approx(
         reference.distances(scenario, flight.position), **length
     )
     assert found["mode"].item() == slot.mode
@@ -167,7 +167,7 @@ def test_without_fading_the_reward_depends_on_the_position_alone() -> None:
 def test_a_flight_off_the_map_ends_where_it_began(start: list[float], action: list[float]) -> None:
     env = SecureOffloadingEnv(TWO_CLUSTERS, seed=0, diagnostics=True)
     state = fly(env, start_at(env, start), action)
-    assert state["position"].tolist() == start
+    assert place(state).tolist() == start
     assert bool(state["off_map"])
     # The attempt costs energy all the same.
     wish = 20.0 * np.array(action)
@@ -180,7 +180,7 @@ def test_a_flight_off_the_map_ends_where_it_began(start: list[float], action: li
 def test_the_edge_of_the_map_belongs_to_it() -> None:
     env = SecureOffloadingEnv(TWO_CLUSTERS, seed=0)
     state = fly(env, start_at(env, [80.0, -80.0]), [1.0, -1.0])
-    assert state["position"].tolist() == [100.0, -100.0]
+    assert place(state).tolist() == [100.0, -100.0]
     assert not state["off_map"].any()
 
 
@@ -203,7 +203,7 @@ def test_the_speed_limit_bounds_each_component_or_the_norm(
 ) -> None:
     env = SecureOffloadingEnv(changed(TWO_CLUSTERS, speed_limit=speed_limit), seed=0)
     state = fly(env, start_at(env, [1.0, 2.0]), action)
-    assert state["position"].tolist() == pytest.approx([1.0 + step[0], 2.0 + step[1]])
+    assert place(state).tolist() == pytest.approx([1.0 + step[0], 2.0 + step[1]])
 
 
 def test_a_slot_twice_as_long_carries_twice_as_far() -> None:
@@ -211,22 +211,42 @@ def test_a_slot_twice_as_long_carries_twice_as_far() -> None:
         changed(TWO_CLUSTERS, slot_duration=2.0, helper_energy_budget=1e9), seed=0
     )
     state = fly(env, start_at(env, [0.0, 0.0]), [0.5, -1.0])
-    assert state["position"].tolist() == pytest.approx([20.0, -40.0])
+    assert place(state).tolist() == pytest.approx([20.0, -40.0])
 
 
 def test_each_row_of_the_batch_may_fly_its_own_scheme() -> None:
     scenario = changed(RANDOM_DISK, fading=False, helper_energy_budget=1000.0, jamming_power=600.0)
-    env = SecureOffloadingEnv(scenario, SCHEMES, (3, 2), seed=0, diagnostics=True)
+    env = SecureOffloadingEnv(scenario, MODE_RULES, (3, 2), seed=0, diagnostics=True)
     position = torch.tensor([[-20.0, -20.0], [20.0, 20.0]]).expand(3, 2, 2)
     mixed = fly(env, start_at(env, position), [1.0, 1.0])
     assert mixed["mode"][1].tolist() == [[1], [1]]
     assert mixed["mode"][2].tolist() == [[0], [0]]
-    for row, scheme in enumerate(SCHEMES):
+    for row, scheme in enumerate(MODE_RULES):
         alone = SecureOffloadingEnv(scenario, scheme, 2, seed=0, diagnostics=True)
         expected = fly(alone, start_at(alone, position[row]), [1.0, 1.0])
         for key in ("position", "mode", "reward"):
             torch.testing.assert_close(mixed[key][row], expected[key])
     # Only the relay need not set jamming energy aside, so it flies farther.
-    steps = (mixed["position"] - position).norm(dim=-1)
+    steps = (place(mixed) - position).norm(dim=-1)
     assert bool((steps[1] > steps[0] + 1.0).all())
     assert torch.equal(steps[0], steps[2])
+
+
+@pytest.mark.parametrize("fading", [True, False])
+def test_each_row_of_the_batch_may_fly_over_its_own_layout(fading: bool) -> None:
+    first = changed(RANDOM_DISK, fading=fading, helper_starts=(60.0, 60.0))
+    moved = {"legitimate_position": (5.0, -5.0), "eavesdropper_positions": (70.0, 90.0)}
+    layouts = [first, changed(TWO_CLUSTERS, fading=fading, helper_starts=(-40.0, 0.0), **moved)]
+    actions = 2 * torch.rand(5, 2, 3, 1, 2, generator=torch.Generator().manual_seed(0)) - 1
+    together = SecureOffloadingEnv(layouts, ["hybrid", "relay"], (2, 3), seed=[4, 9])
+    states = [together.reset()]
+    for action in actions:
+        states.append(together.step(states[-1].clone().set("action", action))["next"])
+    assert together.scenarios == tuple(layouts)
+    for row, scheme in enumerate(["hybrid", "relay"]):
+        alone = SecureOffloadingEnv(layouts[row], scheme, (1, 3), seed=[4, 9][row : row + 1])
+        state = alone.reset()
+        for slot, found in enumerate(states):
+            assert_same(found[row].exclude("action"), state[0].exclude("action"))
+            if slot < len(actions):
+                state = alone.step(state.set("action", actions[slot, row : row + 1]))["next"]

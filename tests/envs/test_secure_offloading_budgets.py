@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 import reference
 from hyuav import Scenario, SecureOffloadingEnv
-from hyuav.physics.slot import SCHEMES
-from reference import assert_same, changed, fly, start_at
+from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.slot import Control, Physics, slot
+from reference import assert_same, changed, fly, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
 RANDOM_DISK = Scenario.preset("random_disk")
@@ -27,7 +28,7 @@ UNLIMITED = {
 
 @given(
     st.sampled_from([TWO_CLUSTERS, RANDOM_DISK]),
-    st.sampled_from(SCHEMES),
+    st.sampled_from(MODE_RULES),
     st.lists(reference.coordinates(100.0), min_size=8, max_size=8),
     st.booleans(),
     SEEDS,
@@ -104,9 +105,9 @@ def test_the_relay_mode_is_affordable_at_half_the_budget_of_jamming() -> None:
 @pytest.mark.parametrize("budget", [0.05, 1.0, 3.0, 6.0])
 def test_a_small_edge_budget_admits_the_best_and_is_kept_in_the_next_slot(budget: float) -> None:
     env, state = above_e(changed(RANDOM_DISK, edge_energy_budget=budget))
-    rates = env.system.jamming_outcome(
-        env.system.channel_gains(env.system.distances(state["position"]), None), None
-    ).secrecy_rate
+    nodes = env.physics.nodes._replace(helper=state["position"])
+    free = Physics(changed(env.scenario, edge_energy_budget=1e30))
+    rates = slot(free, nodes, Control(torch.zeros(1, 2))).jamming.secrecy_rate
     for _ in range(10):
         state = fly(env, state, [0.0, 0.0])
         details = state["diagnostics"]
@@ -137,7 +138,7 @@ def test_the_edge_computes_in_a_slot_what_it_took_in_the_previous_one() -> None:
 @given(
     st.floats(0.1, 3000.0),
     st.sampled_from(["box", "disc"]),
-    st.sampled_from(SCHEMES),
+    st.sampled_from(MODE_RULES),
     reference.actions(),
 )
 def test_a_small_flight_budget_shortens_the_velocity_and_keeps_its_direction(
@@ -148,7 +149,7 @@ def test_a_small_flight_budget_shortens_the_velocity_and_keeps_its_direction(
     state = fly(env, start_at(env, [0.0, 0.0]), action)
     assert float(state["diagnostics", "helper_energy"]) <= budget * (1 + 1e-5)
     assert not state["diagnostics", "budget_violation"].any()
-    flown = state["position"].double().numpy()
+    flown = place(state).double().numpy()
     wish = np.clip(action, -1.0, 1.0)
     assert flown[0] * wish[1] == pytest.approx(flown[1] * wish[0], abs=1e-4)
     assert float(flown @ wish) >= 0.0
@@ -164,7 +165,7 @@ def test_a_budget_below_the_jamming_energy_is_counted_as_exceeded() -> None:
     scenario = changed(TWO_CLUSTERS, helper_energy_budget=0.05)
     env = SecureOffloadingEnv(scenario, "jamming", diagnostics=True, seed=0)
     state = fly(env, start_at(env, [10.0, 0.0]), [1.0, 1.0])
-    assert state["position"].tolist() == [10.0, 0.0]
+    assert place(state).tolist() == [10.0, 0.0]
     assert float(state["diagnostics", "helper_energy"]) == pytest.approx(0.08)
     assert int(state["diagnostics", "budget_violation"]) == 1
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from hyuav import InputError, Scenario, SecureOffloadingEnv
-from hyuav.physics.slot import SCHEMES
-from reference import assert_same, changed, fly, start_at
+from hyuav.physics.offloading import MODE_RULES
+from reference import assert_same, changed, fly, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
 RANDOM_DISK = Scenario.preset("random_disk")
@@ -26,9 +26,9 @@ def test_the_mode_after_a_reset_follows_that_resets_fading() -> None:
 
 
 def test_an_episode_starts_at_the_helpers_start() -> None:
-    env = SecureOffloadingEnv(changed(TWO_CLUSTERS, helper_start=(12.0, -34.0)), batch_size=(2, 3))
+    env = SecureOffloadingEnv(changed(TWO_CLUSTERS, helper_starts=(12.0, -34.0)), batch_size=(2, 3))
     state = env.reset()
-    assert state["position"].tolist() == [[[12.0, -34.0]] * 3] * 2
+    assert place(state).tolist() == [[[12.0, -34.0]] * 3] * 2
     assert not state["off_map"].any()
 
 
@@ -41,10 +41,10 @@ def test_a_reset_off_the_map_is_refused(beyond: list[float]) -> None:
 
 def test_a_reset_does_not_keep_hold_of_the_given_position() -> None:
     env = SecureOffloadingEnv(TWO_CLUSTERS, batch_size=2)
-    position = torch.zeros(2, 2)
+    position = torch.zeros(2, 1, 2)
     state = env.reset(TensorDict({"position": position}, batch_size=(2,)))
     position += 50.0
-    assert not state["position"].any()
+    assert not place(state).any()
 
 
 def test_a_partial_reset_restarts_only_the_rows_asked_for() -> None:
@@ -52,22 +52,22 @@ def test_a_partial_reset_restarts_only_the_rows_asked_for() -> None:
     state = fly(env, start_at(env, [[80.0, 80.0]] * 4), [0.1, 0.2])
     chosen = torch.tensor([[True], [False], [False], [True]])
     after = env.reset(state.clone().exclude("position", "reward").set("_reset", chosen))
-    kept = env.reset(TensorDict({"_reset": chosen, "position": torch.zeros(4, 2)}, batch_size=4))
-    assert after["position"][chosen[:, 0]].tolist() == [[-60.0, -60.0]] * 2
-    assert kept["position"][chosen[:, 0]].tolist() == [[0.0, 0.0]] * 2
+    kept = env.reset(TensorDict({"_reset": chosen, "position": torch.zeros(4, 1, 2)}, batch_size=4))
+    assert place(after)[chosen[:, 0]].tolist() == [[-60.0, -60.0]] * 2
+    assert place(kept)[chosen[:, 0]].tolist() == [[0.0, 0.0]] * 2
 
 
 @pytest.mark.parametrize("diagnostics", [False, True])
 def test_an_automatic_reset_leaves_the_other_rows_in_flight(diagnostics: bool) -> None:
     env = SecureOffloadingEnv(RANDOM_DISK, batch_size=4, seed=0, diagnostics=diagnostics)
-    flown = start_at(env, [[70.0, 70.0]] * 4).set("action", torch.full((4, 2), 0.5))
+    flown = start_at(env, [[70.0, 70.0]] * 4).set("action", torch.full((4, 1, 2), 0.5))
     flown = env.step(flown)
     ended = torch.tensor([[False], [True], [False], [True]])
     flown["next", "done"] = ended
     flown["next", "terminated"] = ended
     state = env.maybe_reset(env.step_mdp(flown))
     over, going = ended[:, 0], ~ended[:, 0]
-    assert state["position"][over].tolist() == [[-60.0, -60.0]] * 2
+    assert place(state)[over].tolist() == [[-60.0, -60.0]] * 2
     assert_same(state[going].exclude("_reset", "action"), flown["next"][going].exclude("reward"))
     if diagnostics:
         assert bool((state["diagnostics", "edge_load"][going] > 0).all())
@@ -77,12 +77,12 @@ def test_an_automatic_reset_leaves_the_other_rows_in_flight(diagnostics: bool) -
         assert not after["diagnostics", "edge_energy"][over].any()
 
 
-@given(SEEDS, st.sampled_from(SCHEMES))
+@given(SEEDS, st.sampled_from(MODE_RULES))
 def test_the_same_seed_gives_the_same_episode_with_and_without_diagnostics(
     seed: int, scheme: str
 ) -> None:
     # With an edge budget that binds, tasks decide who offloads.
-    scenario = changed(RANDOM_DISK, edge_energy_budget=5.0, helper_start=(70.0, 70.0))
+    scenario = changed(RANDOM_DISK, edge_energy_budget=5.0, helper_starts=(70.0, 70.0))
     episodes = []
     for diagnostics in (False, True, False):
         torch.manual_seed(99)  # of the random actions
@@ -138,7 +138,7 @@ def test_a_reset_position_of_another_shape_is_refused() -> None:
 @pytest.mark.parametrize("seed", [0, 2**63 - 1, np.int64(7), torch.tensor(7)])
 def test_any_whole_number_is_a_seed(seed: Any) -> None:
     env = SecureOffloadingEnv(TWO_CLUSTERS, seed=seed)
-    assert env.reset()["position"].tolist() == [-60.0, -60.0]
+    assert place(env.reset()).tolist() == [-60.0, -60.0]
 
 
 @given(SEEDS)

@@ -10,8 +10,8 @@ from torchrl.collectors import Collector
 from torchrl.envs.utils import check_env_specs
 
 from hyuav import InputError, InputTypeError, Scenario, SecureOffloadingEnv
-from hyuav.physics.slot import SCHEMES
-from reference import changed, fly, start_at
+from hyuav.physics.offloading import MODE_RULES
+from reference import changed, fly, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
 RANDOM_DISK = Scenario.preset("random_disk")
@@ -19,7 +19,7 @@ BATCH_SIZES = [(), (1,), (3,), (2, 3)]
 
 
 @pytest.mark.parametrize("batch_size", BATCH_SIZES)
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", MODE_RULES)
 @pytest.mark.parametrize("diagnostics", [False, True])
 def test_the_specs_hold(batch_size: tuple[int, ...], scheme: str, diagnostics: bool) -> None:
     env = SecureOffloadingEnv(TWO_CLUSTERS, scheme, batch_size, seed=0, diagnostics=diagnostics)
@@ -34,9 +34,9 @@ def test_entries_have_the_documented_shapes_and_types() -> None:
     env = SecureOffloadingEnv(TWO_CLUSTERS, batch_size=(2, 3), seed=0, diagnostics=True)
     after = env.rollout(2)["next"]
     documented = {
-        "position": (2, torch.float32),
+        "position": ((1, 2), torch.float32),
         "mode": (1, torch.int64),
-        "distances": (12, torch.float32),
+        "distances": ((1, 12), torch.float32),
         "off_map": (1, torch.bool),
         "reward": (1, torch.float32),
         "done": (1, torch.bool),
@@ -53,7 +53,8 @@ def test_entries_have_the_documented_shapes_and_types() -> None:
     }
     assert set(after.keys(True, True)) == set(documented)
     for key, (size, dtype) in documented.items():
-        assert after[key].shape == (2, 3, 2, size), key
+        shape = size if isinstance(size, tuple) else (size,)
+        assert after[key].shape == (2, 3, 2, *shape), key
         assert after[key].dtype == dtype, key
 
 
@@ -67,9 +68,9 @@ def test_no_slot_ends_the_episode() -> None:
 def test_a_double_precision_action_does_not_change_the_types() -> None:
     env = SecureOffloadingEnv(TWO_CLUSTERS, batch_size=2, seed=0, diagnostics=True)
     state = env.reset(
-        TensorDict({"position": torch.zeros(2, 2, dtype=torch.float64)}, batch_size=2)
+        TensorDict({"position": torch.zeros(2, 1, 2, dtype=torch.float64)}, batch_size=2)
     )
-    assert state["position"].dtype == torch.float32
+    assert place(state).dtype == torch.float32
     assert state["distances"].dtype == torch.float32
     episode = env.rollout(20)
     floats = [value.dtype for value in episode.values(True, True) if value.dtype.is_floating_point]
@@ -92,18 +93,20 @@ def test_a_collector_works_unchanged() -> None:
         {"ue_positions": [(5.0, 5.0)] * 10},
         {"ue_positions": [(0.0, 0.0)]},
         {"ue_positions": [(i / 25, -i / 50) for i in range(1000)]},
-        {"eavesdropper_position": (0.0, 0.0)},
-        {"eavesdropper_position": (0.0, 0.0), "eavesdropper_altitude": 80.0},
+        {"eavesdropper_positions": (0.0, 0.0)},
+        {"eavesdropper_positions": (0.0, 0.0), "eavesdropper_altitude": 80.0},
         {"ue_power": 0.0, "jamming_power": 0.0, "relay_power": 0.0},
         {"task_size": (2e5, 2e5), "cycles_per_bit": (1e3, 1e3)},
         {"task_size": (0.0, 0.0)},
         {"ue_energy_budget": 0.0, "edge_energy_budget": 0.0, "helper_energy_budget": 0.0},
-        {"helper_start": (0.0, 0.0)},
+        {"helper_starts": (0.0, 0.0)},
         {"num_slots": 1},
     ],
 )
 def test_degenerate_worlds_give_finite_numbers(changes: dict[str, Any]) -> None:
-    env = SecureOffloadingEnv(changed(RANDOM_DISK, **changes), SCHEMES, 3, seed=0, diagnostics=True)
+    env = SecureOffloadingEnv(
+        changed(RANDOM_DISK, **changes), MODE_RULES, 3, seed=0, diagnostics=True
+    )
     state = start_at(env, [[0.0, 0.0]] * 3)  # exactly above L
     for action in ([0.0, 0.0], [1.0, 1.0]):
         state = fly(env, state, action)
@@ -127,6 +130,27 @@ def test_degenerate_worlds_give_finite_numbers(changes: dict[str, Any]) -> None:
         ({"batch_size": 2.0}, InputTypeError, "batch_size = 2.0"),
         ({"batch_size": "2"}, InputTypeError, "batch_size = '2'"),
         ({"device": "gpu"}, InputError, "device = 'gpu'"),
+        ({"scenario": [TWO_CLUSTERS]}, InputError, "scenario = '1 scenarios'.*each of 0 rows"),
+        (
+            {"scenario": [TWO_CLUSTERS] * 3, "batch_size": 2},
+            InputError,
+            "scenario = '3 scenarios': expected one scenario, or one for each of 2 rows",
+        ),
+        (
+            {"scenario": [TWO_CLUSTERS, changed(TWO_CLUSTERS, num_slots=3)], "batch_size": 2},
+            InputError,
+            r"scenario\[1\].num_slots = 3: expected num_slots as of scenario\[0\]: rows differ",
+        ),
+        (
+            {
+                "scenario": [TWO_CLUSTERS, changed(TWO_CLUSTERS, ue_positions=[(0.0, 0.0)])],
+                "batch_size": 2,
+            },
+            InputError,
+            r"scenario\[1\].ue_positions = .*rows differ in positions only",
+        ),
+        ({"scenario": ["disk"] * 2, "batch_size": 2}, InputError, "scenario = 'disk'"),
+        ({"scenario": [3] * 2, "batch_size": 2}, InputTypeError, "scenario = 3"),
         ({"seed": -1}, InputError, "seed = -1"),
         ({"seed": 2**63}, InputError, "seed = 9223372036854775808"),
         ({"seed": 1.5}, InputTypeError, "seed = 1.5"),

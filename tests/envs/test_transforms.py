@@ -12,8 +12,9 @@ from torchrl.envs.utils import check_env_specs
 
 import reference
 from hyuav import InputError, Scenario, SecureOffloadingEnv, make_env
-from hyuav.physics.slot import SCHEMES
-from reference import assert_same, fly, start_at
+from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.slot import Control, slot
+from reference import assert_same, fly, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
 RANDOM_DISK = Scenario.preset("random_disk")
@@ -21,7 +22,7 @@ SEEDS = st.integers(0, 2**31)
 
 
 @pytest.mark.parametrize("batch_size", [(), (1,), (3,), (2, 3)])
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", MODE_RULES)
 @pytest.mark.parametrize("diagnostics", [False, True])
 def test_the_specs_hold(batch_size: tuple[int, ...], scheme: str, diagnostics: bool) -> None:
     env = make_env(TWO_CLUSTERS, scheme, batch_size, seed=0, diagnostics=diagnostics)
@@ -49,7 +50,7 @@ def test_a_geofence_lets_no_flight_leave_the_map(
     free = torch.tensor(position) + torch.tensor(action) * scenario.max_speed
     expected = free.clamp(-100.0, 100.0)  # component by component
     if area == "box":
-        torch.testing.assert_close(found["position"][0], expected, rtol=0.0, atol=1e-3)
+        torch.testing.assert_close(place(found)[0], expected, rtol=0.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("clock", [False, True])
@@ -63,7 +64,7 @@ def test_what_a_geofence_slows_is_remembered_as_it_was_wanted() -> None:
     state["action"] = torch.tensor([[1.0, 0.5]])
     flown = env.step(state)
     assert flown["action"].tolist() == [[1.0, 0.5]]
-    torch.testing.assert_close(flown["next", "position"], torch.tensor([[100.0, 10.0]]))
+    torch.testing.assert_close(place(flown["next"]), torch.tensor([[100.0, 10.0]]))
 
 
 @pytest.mark.parametrize("num_slots", [1, 10, 20])
@@ -94,7 +95,7 @@ def test_the_steps_and_the_return_of_an_episode_are_counted_from_its_start() -> 
     # Each episode starts anew.
     for first in (0, 20, 40):
         assert not episodes["episode_reward"][:, first].any()
-        assert episodes["position"][:, first].tolist() == [[-60.0, -60.0]] * 4
+        assert place(episodes)[:, first].tolist() == [[-60.0, -60.0]] * 4
 
 
 @pytest.mark.parametrize("penalty", [0.2, 0.0, 1.5])
@@ -132,7 +133,7 @@ def test_the_observation_is_the_state_normalized_to_order_one(
         assert state["observation"].shape == (3, scenario.num_ues + 5)
         assert state["observation"].dtype == torch.float32
         for row in range(3):
-            x, y = reference.as_list(state["position"][row])
+            x, y = reference.as_list(place(state)[row])
             mode = int(state["mode"][row])
             lengths = reference.distances(scenario, (x, y))
             expected = [x / half, y / half, 2 * mode - 1, *(d / half - 1 for d in lengths)]
@@ -148,7 +149,7 @@ def test_the_observation_is_of_order_one_in_the_corners_of_the_map(
     # Every node in the opposite corner: no distance on the map is longer.
     opposite = (-corner[0], -corner[1])
     scenario = Scenario(
-        ue_positions=(opposite,), legitimate_position=opposite, eavesdropper_position=opposite
+        ue_positions=(opposite,), legitimate_position=opposite, eavesdropper_positions=opposite
     )
     observation = start_at(make_env(scenario), corner)["observation"]
     assert observation[3:].tolist() == pytest.approx([2 * 2**0.5 - 1] * 3)
@@ -184,7 +185,7 @@ def test_an_episode_may_start_at_any_given_position() -> None:
     position = torch.tensor([[[1.0, 2.0], [-3.0, 4.0]], [[100.0, -100.0], [0.0, 0.0]]])
     env.rollout(3)
     state = start_at(env, position)
-    assert torch.equal(state["position"], position)
+    assert torch.equal(place(state), position)
     torch.testing.assert_close(state["observation"][..., :2], position / 100.0)
     assert not state["step_count"].any()
     assert not state["episode_reward"].any()
@@ -206,7 +207,7 @@ def test_a_partial_reset_leaves_the_other_rows_in_flight() -> None:
     assert not state["episode_reward"][over].any()
     assert torch.equal(state["step_count"][going], flown["step_count"][going])
     assert torch.equal(state["episode_reward"][going], flown["episode_reward"][going])
-    assert state["position"][over].tolist() == [[-60.0, -60.0]] * 2
+    assert place(state)[over].tolist() == [[-60.0, -60.0]] * 2
 
 
 def test_rows_that_are_over_restart_while_the_others_fly_on() -> None:
@@ -219,15 +220,15 @@ def test_rows_that_are_over_restart_while_the_others_fly_on() -> None:
     for key in ("position", "mode", "distances", "observation", "episode_reward", "step_count"):
         assert torch.equal(following[key][0], after[key][0]), key
     assert float(following["diagnostics", "edge_load"][0]) > 0.0
-    assert following["position"][1].tolist() == [-60.0, -60.0]
+    assert place(following)[1].tolist() == [-60.0, -60.0]
     assert int(following["step_count"][1]) == 0
     assert float(following["episode_reward"][1]) == 0.0
     assert float(following["diagnostics", "edge_load"][1]) == 0.0
     # What the episode ended with is still told to the learner.
-    assert after["position"][1].tolist() == [80.0, 80.0]
+    assert place(after)[1].tolist() == [80.0, 80.0]
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", MODE_RULES)
 def test_the_same_seed_gives_the_same_episodes_with_and_without_diagnostics(scheme: str) -> None:
     episodes = []
     for seed, diagnostics in ((3, False), (3, True), (3, False), (4, False)):
@@ -241,7 +242,7 @@ def test_the_same_seed_gives_the_same_episodes_with_and_without_diagnostics(sche
 
 
 def test_each_row_may_fly_its_own_scheme() -> None:
-    episode = make_env(RANDOM_DISK, SCHEMES, 3, seed=0).rollout(20)
+    episode = make_env(RANDOM_DISK, MODE_RULES, 3, seed=0).rollout(20)
     assert bool((episode["next", "mode"][1] == 1).all())
     assert bool((episode["next", "mode"][2] == 0).all())
 
@@ -302,13 +303,16 @@ def test_bad_arguments_are_answered_in_one_line(arguments: dict[str, Any], field
 def test_the_fading_that_is_told_is_what_the_slot_was_earned_by(
     batch_size: tuple[int, ...], fading: bool
 ) -> None:
-    scenario = dataclasses.replace(TWO_CLUSTERS, fading=fading, helper_start=(-40.0, 0.0))
+    scenario = dataclasses.replace(TWO_CLUSTERS, fading=fading, helper_starts=(-40.0, 0.0))
     env = make_env(scenario, "relay", batch_size, seed=0, fading=True)
     check_env_specs(env)
     silent = make_env(scenario, "relay", batch_size, seed=0)
     found = env.rollout(5)["next"]
     assert found["fading"].shape == (*batch_size, 5, 3 * scenario.num_ues + 2)
-    rates, _ = env.base_env.system.sum_rates(found["position"], found["fading"])
+    physics = env.base_env.physics
+    nodes = physics.nodes._replace(helper=found["position"])
+    fading = physics.link_row.unflatten(found["fading"])
+    rates = slot(physics, nodes, Control(torch.zeros(1, 2)), fading).relay.sum_rate
     torch.testing.assert_close(found["reward"].squeeze(-1), rates - 0.2 * found["off_map"][..., 0])
     assert bool((found["fading"] == 1.0).all()) != fading
     assert "fading" not in silent.reset()

@@ -22,7 +22,7 @@ from hyuav.experiments.schemes import LABELS, OPTIMA
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.weights import copy_weights
-from hyuav.references.optimum import FlightPolicy, solve
+from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
@@ -33,7 +33,7 @@ FEW = EvaluationParameters(episodes=40, flights=2, seed=5)
 def policies() -> dict[str, list[Policy]]:
     algorithm = DDPG(hidden_sizes=(8,))
     weights = copy_weights(algorithm.build(2, TEN_UES).loss)
-    optima = solve(SCENARIO, resolution=2.0)
+    optima = solve_optimum(SCENARIO, resolution=2.0)
     return {
         "re_lt": [Policy(re_lt(SCENARIO))],
         "ja_lt": [Policy(ja_lt(SCENARIO))],
@@ -70,8 +70,8 @@ def test_a_fixed_mode_scheme_is_measured_against_its_own_optimum_and_the_hybrid_
 
 
 def test_all_schemes_fly_through_the_same_fading() -> None:
-    everywhere = SCENARIO.helper_start
-    still = dataclasses.replace(SCENARIO, eavesdropper_position=everywhere)
+    everywhere = SCENARIO.helper_starts[0]
+    still = dataclasses.replace(SCENARIO, eavesdropper_positions=everywhere)
     hovering = Policy(ja_lt(still))
     few = EvaluationParameters(episodes=5, flights=5, seed=3)
     twice = [fly(still, scheme, hovering, few).slots for scheme in ("ja_lt", "optimum")]
@@ -113,7 +113,7 @@ def test_the_totals_are_sums_over_the_slots_of_an_episode() -> None:
 
 
 def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> None:
-    leaving = dataclasses.replace(SCENARIO, eavesdropper_position=(-100.0, -100.0))
+    leaving = dataclasses.replace(SCENARIO, eavesdropper_positions=(-100.0, -100.0))
     policy = Policy(ja_lt(dataclasses.replace(leaving, num_slots=3)))
     flown = fly(leaving, "ja_lt", policy, EvaluationParameters(episodes=4, flights=4)).slots
     assert flown["off_map"].any()

@@ -1,10 +1,10 @@
 from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, OPTIMA, SCHEMES
-from hyuav.physics import slot
+from hyuav.physics.offloading import MODE_RULES
 
 
 def test_every_mode_rule_is_learned_twice_and_has_an_optimum() -> None:
     for schemes in (LEARNED, LEARNED_AS_IN_PAPER, OPTIMA):
-        assert set(schemes) == set(slot.SCHEMES)
+        assert set(schemes) == set(MODE_RULES)
         assert all(SCHEMES[name].mode_rule == rule for rule, name in schemes.items())
 
 

@@ -84,7 +84,7 @@ def extremes(draw: st.DrawFn) -> dict[str, Any]:
     corner = st.sampled_from([-half, 0.0, half])
     point = st.tuples(corner, corner)
     values["ue_positions"] = draw(st.lists(point, min_size=1, max_size=4))
-    for name in ("legitimate_position", "eavesdropper_position", "helper_start"):
+    for name in ("legitimate_position", "eavesdropper_positions", "helper_starts"):
         values[name] = draw(point)
     for name in ("task_size", "cycles_per_bit"):
         values[name] = draw(st.sampled_from([(0.0, 0.0), (0.0, 1e12), (1e6, 1e6)]))
@@ -111,7 +111,7 @@ def test_an_extreme_scenario_stays_finite() -> None:
 @pytest.mark.parametrize("name", sorted(BOUNDS))
 def test_the_ends_of_what_a_parameter_may_be_are_flown(name: str) -> None:
     origin = dict.fromkeys(
-        ("legitimate_position", "eavesdropper_position", "helper_start"), (0.0, 0.0)
+        ("legitimate_position", "eavesdropper_positions", "helper_starts"), (0.0, 0.0)
     )
     for value in BOUNDS[name]:
         changes: dict[str, Any] = {**origin, "ue_positions": [(0.0, 0.0)] * 2, name: value}

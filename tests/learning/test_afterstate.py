@@ -26,7 +26,7 @@ def test_it_is_what_the_environment_brings(
 ) -> None:
     scenario = dataclasses.replace(SCENARIO, speed_limit=limit)
     env = make_env(scenario, "relay", (1,), seed=0, clock=clock, geofence=geofence)
-    state = env.reset(env.reset().select("position").set("position", torch.tensor([start])))
+    state = env.reset(env.reset().select("position").set("position", torch.tensor([[start]])))
     state["action"] = torch.tensor([action])
     afterstate = Afterstate(scenario, clock=clock, geofence=geofence)
     features = afterstate(state["observation"], state["action"])
@@ -37,12 +37,12 @@ def test_it_is_what_the_environment_brings(
         return  # the edge itself belongs to the map or not by rounding
     torch.testing.assert_close(
         features[:, : num_ues + 4],
-        torch.cat([after["position"] / 100.0, after["distances"] / 100.0 - 1.0], dim=-1),
+        torch.cat([after["position"] / 100.0, after["distances"] / 100.0 - 1.0], dim=-1)[:, 0],
         rtol=0.0,
         atol=1e-4,
     )
     covered, beside = features[:, num_ues + 4 : -1 - clock], features[:, 2 * num_ues + 4]
-    apart = (after["distances"][:, :num_ues] - scenario.coverage_radius).abs() > 0.1
+    apart = (after["distances"][:, 0, :num_ues] - scenario.coverage_radius).abs() > 0.1
     inside = after["distances"][:, :num_ues] < scenario.coverage_radius
     assert torch.equal(covered[apart] > 0.0, inside[apart])
     assert bool(beside > 0.0) == bool(after["off_map"])

@@ -13,7 +13,7 @@ from hyuav.learning import training as training_module
 from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.physics.slot import SCHEMES
+from hyuav.physics.offloading import MODE_RULES
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 FADELESS = dataclasses.replace(SCENARIO, fading=False, edge_energy_budget=8.0, speed_limit="disc")
@@ -140,7 +140,7 @@ def trained(learners: list[Learner], **changes: Any) -> Training:
 @pytest.mark.parametrize(
     ("cohorts", "learners"),
     [
-        (1, [Learner(scheme, 4) for scheme in SCHEMES]),  # who share their luck
+        (1, [Learner(scheme, 4) for scheme in MODE_RULES]),  # who share their luck
         (2, [Learner("hybrid", seed) for seed in range(4)]),
     ],
 )

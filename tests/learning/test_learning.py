@@ -10,10 +10,10 @@ from hyuav import Scenario
 from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.references.optimum import solve
+from hyuav.references.optimum import solve_optimum
 
 EASY = dataclasses.replace(
-    Scenario.preset("two_clusters"), helper_start=(20.0, 20.0), num_slots=10, fading=False
+    Scenario.preset("two_clusters"), helper_starts=(20.0, 20.0), num_slots=10, fading=False
 )
 """Jamming pays within two slots of the start: a small network finds it in few episodes."""
 
@@ -36,7 +36,7 @@ def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
     )
     training = Training(EASY, [Learner("jamming", i) for i in range(3)], algorithm, parameters)
     list(training.episodes())
-    optimum = solve(EASY, ["jamming"], resolution=2.0)["jamming"].value
+    optimum = solve_optimum(EASY, ["jamming"], resolution=2.0)["jamming"].value
     assert training.best_evaluation.median().item() > 0.85 * optimum
 
 
@@ -83,6 +83,6 @@ def test_every_seed_of_the_robust_variant_finds_the_far_region(num_slots: int) -
             if episode.evaluation is not None
         ]
     )
-    optima = solve(scenario, ["hybrid", "jamming"])
+    optima = solve_optimum(scenario, ["hybrid", "jamming"])
     best = torch.tensor([optima[learner.scheme].value for learner in learners])
     assert bool((earned.amax(dim=0) > 0.95 * best).all())

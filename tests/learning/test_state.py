@@ -65,7 +65,7 @@ ODD: list[tuple[tuple[Any, ...], Any]] = [
     (("replay", "_batch_size"), 3),
     (("replay", "_storage", "_storage", "next.reward"), torch.zeros(6, 2, 2)),
     (("slot", "step_count"), torch.full((2, 1), 9)),
-    (("slot", "position"), torch.full((2, 2), NAN)),
+    (("slot", "position"), torch.full((2, 1, 2), NAN)),
     (("slot", "observation"), torch.zeros(2, 9)),
     (("slot", "action"), "north"),
     (("slot", "next"), torch.zeros(2, 2)),

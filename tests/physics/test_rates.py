@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 import reference
 from hyuav import Scenario
 from hyuav.physics import rates as secrecy
-from hyuav.physics.rates import AchievableRates, ChannelGains
+from hyuav.physics.channel import LinkRow, Links
+from hyuav.physics.rates import AchievableRates
 
 GAIN = st.floats(-14.0, -2.0).map(lambda exponent: 10.0**exponent)
 SNR = st.floats(-6.0, 6.0).map(lambda exponent: 10.0**exponent)
@@ -25,8 +26,10 @@ def both(rates: AchievableRates) -> tuple[torch.Tensor, torch.Tensor]:
     return rates.legitimate, rates.eavesdropper
 
 
-def gains_of(*values: float, dtype: torch.dtype = torch.float64) -> ChannelGains:
-    return ChannelGains(*(torch.tensor([value], dtype=dtype) for value in values))
+def gains_of(*values: float, dtype: torch.dtype = torch.float64) -> Links:
+    """Of one UE, one helper and one eavesdropper."""
+    row = torch.tensor(values, dtype=dtype)
+    return LinkRow(1, 1, 1).unflatten(row)
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -134,21 +137,21 @@ def test_only_offloading_ues_add_to_the_secrecy_sum_rate() -> None:
 @pytest.mark.parametrize("mode", [secrecy.relay_rates, secrecy.jamming_rates])
 def test_rates_are_differentiable_in_every_gain(mode: Callable[..., AchievableRates]) -> None:
     # In units where gains are of order one; noise follows.
-    values = [torch.tensor([v], dtype=torch.float64, requires_grad=True) for v in (2, 3, 5, 7, 11)]
+    values = [gain.requires_grad_() for gain in gains_of(2, 3, 5, 7, 11)]
 
     def rates(*gains: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        return both(mode(ChannelGains(*gains), 1.3, 0.7, 0.5))
+        return both(mode(Links(*gains), 1.3, 0.7, 0.5))
 
     assert torch.autograd.gradcheck(rates, values)
 
 
 def test_one_helper_gain_serves_all_ues_of_a_batch() -> None:
-    gains = ChannelGains(
+    gains = Links(
         torch.full((10,), 1e-9),
-        torch.full((4, 3, 10), 1e-9),
-        torch.full((10,), 1e-10),
+        torch.full((4, 3, 10, 1), 1e-9),
+        torch.full((10, 1), 1e-10),
         torch.full((4, 3, 1), 1e-8),
-        torch.full((4, 3, 1), 1e-8),
+        torch.full((4, 3, 1, 1), 1e-8),
     )
     assert secrecy.relay_rates(gains, 0.1, 0.01, 1e-13).legitimate.shape == (4, 3, 10)
     assert secrecy.jamming_rates(gains, 0.1, 0.01, 1e-13).legitimate.shape == (4, 3, 10)

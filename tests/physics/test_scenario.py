@@ -40,7 +40,8 @@ WITHIN_FLOAT32 = {
 }
 DECIBEL = ("ground_to_air_k_factor", "air_to_air_k_factor")
 NUMBERS = (*POSITIVE, *NON_NEGATIVE, *DECIBEL)
-POINTS = ("legitimate_position", "eavesdropper_position", "helper_start")
+NODES = ("eavesdropper_positions", "helper_starts")
+POINTS = ("legitimate_position", *NODES)
 RANGES = ("task_size", "cycles_per_bit")
 FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
 
@@ -66,11 +67,11 @@ def with_value(name: str, value: Any) -> Any:
     return getattr(dataclasses.replace(TWO_CLUSTERS, **{name: value}), name)
 
 
-def test_the_defaults_are_those_of_the_parameter_table() -> None:
+def test_the_defaults_are_those_of_the_papers_parameter_table() -> None:
     expected = {
         "legitimate_position": (0.0, 0.0),
-        "eavesdropper_position": (80.0, 80.0),
-        "helper_start": (-60.0, -60.0),
+        "eavesdropper_positions": ((80.0, 80.0),),
+        "helper_starts": ((-60.0, -60.0),),
         "num_slots": 20,
         "slot_duration": 1.0,
         "map_side": 200.0,
@@ -98,8 +99,7 @@ def test_the_defaults_are_those_of_the_parameter_table() -> None:
         "helper_energy_budget": 3900.0,
         "speed_limit": "box",
     }
-    found = {name: getattr(TWO_CLUSTERS, name) for name in FIELDS if name != "ue_positions"}
-    assert found == expected
+    assert {name: getattr(TWO_CLUSTERS, name) for name in expected} == expected
 
 
 def test_the_presets_place_ten_ues() -> None:
@@ -245,6 +245,9 @@ def test_the_speed_limit_is_a_box_or_a_disc(value: Any) -> None:
 @pytest.mark.parametrize("value", [(1.0, -2.0), [1, -2], np.array([1, -2]), torch.tensor([1, -2])])
 def test_a_position_may_be_a_list_an_array_or_a_tensor(name: str, value: Any) -> None:
     kept = with_value(name, value)
+    if name in NODES:  # a pair is taken as one node
+        (kept,) = kept
+        assert with_value(name, [value]) == (kept,)
     assert kept == (1.0, -2.0)
     assert [type(coordinate) for coordinate in kept] == [float, float]
 
@@ -256,9 +259,7 @@ def test_a_position_has_two_finite_coordinates(name: str, value: Any) -> None:
 
 
 @pytest.mark.parametrize("name", POINTS)
-@pytest.mark.parametrize(
-    "value", [None, 3.0, "xy", {1.0, 2.0}, {"x": 1, "y": 2}, [[1], [2]], ["a", 1]]
-)
+@pytest.mark.parametrize("value", [None, 3.0, "xy", {1.0, 2.0}, {"x": 1, "y": 2}, ["a", 1]])
 def test_a_position_is_made_of_numbers(name: str, value: Any) -> None:
     refused(name, value, InputTypeError)
 
@@ -273,13 +274,26 @@ def test_every_node_lies_on_the_map(name: str, axis: int, beyond: float, sign: i
     assert refused("ue_positions", ues).startswith("ue_positions[2] = ")
 
 
+@pytest.mark.parametrize("name", NODES)
+@pytest.mark.parametrize("value", [[(1, 2), (3, 4)], np.zeros((2, 2)), torch.zeros(3, 2)])
+def test_there_is_one_helper_and_one_eavesdropper(name: str, value: Any) -> None:
+    assert refused(name, value).endswith("expected the position (x, y) of one node")
+    refused(name, [])
+
+
+@pytest.mark.parametrize("old", ["helper_start", "eavesdropper_position"])
+def test_a_former_name_is_answered_by_the_present_one(old: str) -> None:
+    with pytest.raises(InputError, match=f"unknown field '{old}': did you mean '{old}s'"):
+        Scenario.from_dict({**TWO_CLUSTERS.to_dict(), old: (0.0, 0.0)})
+
+
 def test_the_edge_of_the_map_belongs_to_it() -> None:
-    assert with_value("helper_start", (-100, 100)) == (-100.0, 100.0)
+    assert with_value("helper_starts", [(-100, 100)]) == ((-100.0, 100.0),)
     assert with_value("ue_positions", [(100, -100)]) == ((100.0, -100.0),)
 
 
 def test_a_map_too_small_for_its_nodes_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^eavesdropper_position = .*on the map"):
+    with pytest.raises(InputError, match=r"^eavesdropper_positions\[0\] = .*on the map"):
         dataclasses.replace(TWO_CLUSTERS, map_side=150.0)
 
 

@@ -7,14 +7,15 @@ import pytest
 import torch
 
 from hyuav import Scenario
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Physics
+from hyuav.physics.tasks import draw_tasks
 
 
 def test_fading_has_unit_mean_and_rician_variance_on_every_link() -> None:
     scenario = dataclasses.replace(
         Scenario.preset("two_clusters"), ground_to_air_k_factor=3.0, air_to_air_k_factor=9.0
     )
-    draws = SecureOffloadingSystem(scenario, dtype=torch.float64).draw_fading(
+    draws = Physics(scenario, dtype=torch.float64).draw_fading(
         (100_000,), torch.Generator().manual_seed(1)
     )
     assert draws is not None
@@ -29,9 +30,9 @@ def test_fading_has_unit_mean_and_rician_variance_on_every_link() -> None:
 
 
 def test_fading_is_independent_from_link_to_link_and_slot_to_slot() -> None:
-    system = SecureOffloadingSystem(Scenario.preset("two_clusters"), dtype=torch.float64)
+    physics = Physics(Scenario.preset("two_clusters"), dtype=torch.float64)
     generator = torch.Generator().manual_seed(2)
-    first, second = (system.draw_fading((20_000,), generator) for _ in range(2))
+    first, second = (physics.draw_fading((20_000,), generator) for _ in range(2))
     assert first is not None
     assert second is not None
     correlation = torch.corrcoef(torch.cat([first, second], dim=-1).T)
@@ -40,17 +41,17 @@ def test_fading_is_independent_from_link_to_link_and_slot_to_slot() -> None:
 
 
 def test_fading_can_be_switched_off() -> None:
-    system = SecureOffloadingSystem(
+    physics = Physics(
         dataclasses.replace(Scenario.preset("two_clusters"), fading=False), dtype=torch.float64
     )
-    assert system.draw_fading((3,), torch.Generator()) is None
+    assert physics.draw_fading((3,), torch.Generator()) is None
 
 
 def test_a_pure_line_of_sight_is_no_fading() -> None:
     scenario = dataclasses.replace(
         Scenario.preset("two_clusters"), ground_to_air_k_factor=100.0, air_to_air_k_factor=100.0
     )
-    fading = SecureOffloadingSystem(scenario, dtype=torch.float64).draw_fading(
+    fading = Physics(scenario, dtype=torch.float64).draw_fading(
         (100,), torch.Generator().manual_seed(0)
     )
     torch.testing.assert_close(fading, torch.ones(100, 32, dtype=torch.float64), rtol=0, atol=1e-4)
@@ -59,7 +60,7 @@ def test_a_pure_line_of_sight_is_no_fading() -> None:
 @pytest.mark.parametrize(("decibel", "ratio"), [(12.0, 15.849), (20.0, 100.0)])
 def test_the_k_factor_is_given_in_decibel(decibel: float, ratio: float) -> None:
     scenario = dataclasses.replace(Scenario.preset("two_clusters"), ground_to_air_k_factor=decibel)
-    draws = SecureOffloadingSystem(scenario, dtype=torch.float64).draw_fading(
+    draws = Physics(scenario, dtype=torch.float64).draw_fading(
         (200_000,), torch.Generator().manual_seed(4)
     )
     assert draws is not None
@@ -69,8 +70,8 @@ def test_the_k_factor_is_given_in_decibel(decibel: float, ratio: float) -> None:
 
 
 def test_tasks_are_uniform_over_their_ranges_and_independent() -> None:
-    system = SecureOffloadingSystem(Scenario.preset("two_clusters"), dtype=torch.float64)
-    tasks = system.draw_tasks((40_000,), torch.Generator().manual_seed(3))
+    scenario, generator = Scenario.preset("two_clusters"), torch.Generator().manual_seed(3)
+    tasks = draw_tasks(scenario, (40_000,), generator, torch.float64)
     for values, (low, high) in ((tasks.size, (160e3, 240e3)), (tasks.cycles_per_bit, (1e3, 1.2e3))):
         assert values.shape == (40_000, 10)
         assert float(values.min()) >= low
@@ -88,7 +89,5 @@ def test_a_task_range_of_no_width_is_that_value() -> None:
     scenario = dataclasses.replace(
         Scenario.preset("two_clusters"), task_size=(5.0, 5.0), cycles_per_bit=(7.0, 7.0)
     )
-    tasks = SecureOffloadingSystem(scenario, dtype=torch.float64).draw_tasks(
-        (50,), torch.Generator().manual_seed(0)
-    )
+    tasks = draw_tasks(scenario, (50,), torch.Generator().manual_seed(0), torch.float64)
     assert tasks.cpu_cycles.unique().tolist() == [35.0]

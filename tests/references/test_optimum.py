@@ -7,15 +7,17 @@ import pytest
 import torch
 
 from hyuav import InputError, Scenario, make_env
+from hyuav.physics.energy import budget_speed
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS
-from hyuav.physics.slot import SCHEMES, SecureOffloadingSystem
+from hyuav.physics.slot import Control, Physics, slot
 from hyuav.references.optimum import (
     RESOLUTION,
     FlightPolicy,
     Optimum,
     _flyable,
-    solve,
     solve_horizons,
+    solve_optimum,
 )
 
 REFERENCE = {
@@ -30,11 +32,11 @@ def without_fading(name: str = "two_clusters", **changes: Any) -> Scenario:
 
 def few_flights(**changes: Any) -> Scenario:
     """So few slots, from a start between both modes' regions, that every flight can be tried."""
-    return without_fading(helper_start=(30.0, 30.0), num_slots=3, **changes)
+    return without_fading(helper_starts=(30.0, 30.0), num_slots=3, **changes)
 
 
 def flown_return(optimum: Optimum, episodes: int) -> torch.Tensor:
-    env = make_env(optimum.scenario, optimum.scheme, batch_size=episodes, seed=5)
+    env = make_env(optimum.scenario, optimum.mode_rule, batch_size=episodes, seed=5)
     policy = FlightPolicy(optimum.path, optimum.scenario)
     flight = env.rollout(optimum.scenario.num_slots, policy)
     return flight["next", "reward"].sum(dim=(-1, -2))
@@ -45,34 +47,46 @@ def test_reaches_the_values_of_the_specification(name: str) -> None:
     expected = REFERENCE[name]
     found = solve_horizons(without_fading(name), list(expected), resolution=1.0)
     for horizon, values in expected.items():
-        optima = [found[scheme][horizon].value for scheme in SCHEMES]
+        optima = [found[scheme][horizon].value for scheme in MODE_RULES]
         assert optima == pytest.approx(values, rel=1e-4)
 
 
 @pytest.mark.parametrize("name", REFERENCE)
 def test_the_best_hybrid_relays_early_and_jams_late(name: str) -> None:
-    modes = solve(without_fading(name), ["hybrid"], resolution=1.0)["hybrid"].modes
+    modes = solve_optimum(without_fading(name), ["hybrid"], resolution=1.0)["hybrid"].modes
     assert modes[:4].any()
     assert not modes[4:].any()
 
 
-def test_fixed_schemes_keep_their_mode() -> None:
-    optima = solve(without_fading(), resolution=4.0)
-    assert optima["relay"].modes.tolist() == [1] * 20
-    assert optima["jamming"].modes.tolist() == [0] * 20
+def test_the_power_is_the_nominal_one_of_the_mode() -> None:
+    optimum = solve_optimum(without_fading(), ["hybrid"], resolution=4.0)["hybrid"]
+    relays = optimum.modes == 1
+    assert optimum.power.shape == optimum.modes.shape == (20, 1)
+    assert optimum.power[relays].tolist() == [0.012] * int(relays.sum())
+    assert optimum.power[~relays].tolist() == [0.08] * int((~relays).sum())
+    assert optimum.upper_bound is None
+
+
+def test_fixed_mode_rules_keep_their_mode() -> None:
+    optima = solve_optimum(without_fading(), resolution=4.0)
+    assert optima["relay"].modes.tolist() == [[1]] * 20
+    assert optima["jamming"].modes.tolist() == [[0]] * 20
 
 
 def brute_force(scenario: Scenario, scheme: str, resolution: float) -> float:
     """The best return over all flights, one by one."""
-    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
+    physics = Physics(scenario, dtype=torch.float64)
     half = scenario.map_side / 2
     count = int(scenario.map_side / resolution)
-    axis = [scenario.helper_start[0] + resolution * k for k in range(-count, count + 1)]
+    axis = [scenario.helper_starts[0][0] + resolution * k for k in range(-count, count + 1)]
     points = list(itertools.product([x for x in axis if abs(x) <= half], repeat=2))
-    relay, jamming = system.sum_rates(torch.tensor(points, dtype=torch.float64))
+    helper = torch.tensor(points, dtype=torch.float64).unsqueeze(-2)
+    hovering = Control(torch.zeros_like(helper))
+    slots = slot(physics, physics.nodes._replace(helper=helper), hovering)
+    relay, jamming = slots.relay.sum_rate, slots.jamming.sum_rate
     rewards = {"relay": relay, "jamming": jamming, "hybrid": torch.maximum(relay, jamming)}
     reward = dict(zip(points, rewards[scheme].tolist(), strict=True))
-    norm = system.budget_speed(scheme)
+    norm = budget_speed(scenario, scheme)
     if scenario.speed_limit == "disc":
         norm = min(norm, scenario.max_speed)
 
@@ -87,14 +101,14 @@ def brute_force(scenario: Scenario, scheme: str, resolution: float) -> float:
             return 0.0
         return max(reward[after] + best(after, slots - 1) for after in nearby[point])
 
-    return best(scenario.helper_start, scenario.num_slots)
+    return best(scenario.helper_starts[0], scenario.num_slots)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", MODE_RULES)
 @pytest.mark.parametrize("limits", [{}, {"speed_limit": "disc"}, {"helper_energy_budget": 1500.0}])
 def test_no_flight_of_a_small_instance_is_better(scheme: str, limits: dict[str, Any]) -> None:
     scenario = few_flights(**limits)
-    optimum = solve(scenario, [scheme], resolution=10.0)[scheme]
+    optimum = solve_optimum(scenario, [scheme], resolution=10.0)[scheme]
     assert optimum.value > 0.1
     assert optimum.value == pytest.approx(brute_force(scenario, scheme, 10.0), rel=1e-4)
 
@@ -112,13 +126,13 @@ def test_each_horizon_has_the_value_of_its_own_problem() -> None:
     for horizon, optimum in together.items():
         alone = dataclasses.replace(scenario, num_slots=horizon)
         assert optimum.scenario == alone
-        assert optimum.value == solve(alone, ["hybrid"], resolution=4.0)["hybrid"].value
+        assert optimum.value == solve_optimum(alone, ["hybrid"], resolution=4.0)["hybrid"].value
 
 
 @pytest.mark.parametrize("name", REFERENCE)
 def test_a_finer_nested_grid_is_never_worse(name: str) -> None:
     values = [
-        [optimum.value for optimum in solve(without_fading(name), resolution=r).values()]
+        [optimum.value for optimum in solve_optimum(without_fading(name), resolution=r).values()]
         for r in (8.0, 4.0, 2.0, 1.0)
     ]
     for coarse, fine in itertools.pairwise(values):
@@ -148,7 +162,7 @@ def test_the_hybrid_is_at_least_as_good_as_either_mode(fading: bool) -> None:
 def test_the_flight_keeps_the_speed_limit_and_the_energy_budget(
     limits: dict[str, Any], norm: float
 ) -> None:
-    for optimum in solve(without_fading(**limits), resolution=2.0).values():
+    for optimum in solve_optimum(without_fading(**limits), resolution=2.0).values():
         steps = optimum.path.diff(dim=0)
         assert steps.abs().max() <= 20.0 + 1e-6
         fastest = float(torch.linalg.vector_norm(steps, dim=-1).max())
@@ -158,7 +172,7 @@ def test_the_flight_keeps_the_speed_limit_and_the_energy_budget(
 
 def test_a_helper_without_energy_to_fly_stays() -> None:
     scenario = without_fading(helper_energy_budget=0.0)
-    path = solve(scenario, ["hybrid"], resolution=4.0)["hybrid"].path
+    path = solve_optimum(scenario, ["hybrid"], resolution=4.0)["hybrid"].path
     assert (path - path[0]).abs().max() == 0.0
 
 
@@ -182,20 +196,20 @@ def test_a_position_on_the_edge_of_coverage_or_map_is_flown_just_inside() -> Non
         coverage_radius=radius,
         map_side=100.0,
         ue_positions=((0.3, 0.7),),
-        eavesdropper_position=(40.0, 40.0),
+        eavesdropper_positions=(40.0, 40.0),
     )
     edge = (0.3 + radius * 0.6, 0.7 + radius * 0.8)
-    path = torch.tensor([(10.0, 20.0), edge, (35.0, 40.0), corner], dtype=torch.float64)
-    flown = _flyable(path, SecureOffloadingSystem(scenario, dtype=torch.float64), "hybrid")
+    path = torch.tensor([[(10.0, 20.0)], [edge], [(35.0, 40.0)], [corner]], dtype=torch.float64)
+    flown = _flyable(path, Physics(scenario, dtype=torch.float64), "hybrid")
     assert (flown - path).abs().max() < 2e-4
-    assert torch.dist(flown[1], torch.tensor([0.3, 0.7], dtype=torch.float64)) < radius - 1e-5
+    assert torch.dist(flown[1, 0], torch.tensor([0.3, 0.7], dtype=torch.float64)) < radius - 1e-5
     assert flown[3].max() < 50.0 - 1e-5
     assert torch.equal(flown[[0, 2]], path[[0, 2]])
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", MODE_RULES)
 def test_flown_with_fading_it_earns_its_value(scheme: str) -> None:
-    optimum = solve("two_clusters", [scheme], resolution=4.0, evaluation_draws=4000)[scheme]
+    optimum = solve_optimum("two_clusters", [scheme], resolution=4.0, evaluation_draws=4000)[scheme]
     returns = flown_return(optimum, 2000)
     error = math.hypot(float(returns.std()) / math.sqrt(2000), optimum.standard_error)
     assert abs(float(returns.mean()) - optimum.value) < 4 * error
@@ -203,7 +217,7 @@ def test_flown_with_fading_it_earns_its_value(scheme: str) -> None:
 
 def test_random_flights_never_beat_it() -> None:
     scenario = without_fading()
-    optimum = solve(scenario, ["hybrid"], resolution=1.0)["hybrid"]
+    optimum = solve_optimum(scenario, ["hybrid"], resolution=1.0)["hybrid"]
     torch.manual_seed(0)
     flights = make_env(scenario, "hybrid", batch_size=2000, seed=0).rollout(20)
     assert flights["next", "reward"].sum(dim=(-1, -2)).max() < optimum.value
@@ -212,10 +226,10 @@ def test_random_flights_never_beat_it() -> None:
 def test_a_saturated_edge_server_lowers_the_value() -> None:
     free = few_flights()
     busy = dataclasses.replace(free, edge_energy_budget=0.5)
-    assert SecureOffloadingSystem(busy).edge_can_saturate
+    assert Physics(busy).edge_can_saturate
     settings: dict[str, Any] = {"resolution": 10.0, "draws": 64, "evaluation_draws": 2000}
-    saturated = solve(busy, ["hybrid"], **settings)["hybrid"]
-    assert 0.0 < saturated.value < solve(free, ["hybrid"], **settings)["hybrid"].value
+    saturated = solve_optimum(busy, ["hybrid"], **settings)["hybrid"]
+    assert 0.0 < saturated.value < solve_optimum(free, ["hybrid"], **settings)["hybrid"].value
     assert saturated.standard_error > 0.0
     returns = flown_return(saturated, 2000)
     error = math.hypot(float(returns.std()) / math.sqrt(2000), saturated.standard_error)
@@ -224,7 +238,9 @@ def test_a_saturated_edge_server_lowers_the_value() -> None:
 
 def test_the_seed_makes_it_reproducible() -> None:
     first, second = (
-        solve("two_clusters", ["hybrid"], resolution=8.0, draws=16, evaluation_draws=100, seed=3)
+        solve_optimum(
+            "two_clusters", ["hybrid"], resolution=8.0, draws=16, evaluation_draws=100, seed=3
+        )
         for _ in range(2)
     )
     assert first["hybrid"].value == second["hybrid"].value
@@ -233,7 +249,7 @@ def test_the_seed_makes_it_reproducible() -> None:
 
 @pytest.mark.parametrize("batch", [(), (3,), (2, 3)])
 def test_the_policy_flies_any_batch_along_the_path(batch: tuple[int, ...]) -> None:
-    optimum = solve(without_fading(), ["relay"], resolution=4.0)["relay"]
+    optimum = solve_optimum(without_fading(), ["relay"], resolution=4.0)["relay"]
     env = make_env(optimum.scenario, "relay", batch_size=batch)
     flight = env.rollout(20, FlightPolicy(optimum.path, optimum.scenario))
     assert flight["action"].shape == (*batch, 20, 2)
@@ -250,8 +266,8 @@ def test_the_policy_flies_any_batch_along_the_path(batch: tuple[int, ...]) -> No
         ({"resolution": math.inf}, "resolution"),
         ({"resolution": 1e-3}, "resolution"),
         ({"resolution": "fine"}, "resolution"),
-        ({"schemes": ["relays"]}, "scheme"),
-        ({"schemes": "hybird"}, "scheme"),
+        ({"mode_rules": ["relays"]}, "mode_rules"),
+        ({"mode_rules": "hybird"}, "mode_rules"),
         ({"draws": 1}, "draws"),
         ({"draws": 2.5}, "draws"),
         ({"evaluation_draws": 0}, "evaluation_draws"),
@@ -261,7 +277,7 @@ def test_the_policy_flies_any_batch_along_the_path(batch: tuple[int, ...]) -> No
 )
 def test_bad_input_is_answered_in_one_line(arguments: dict[str, Any], field: str) -> None:
     with pytest.raises(InputError, match=field) as caught:
-        solve(**{"scenario": "two_clusters", **arguments})
+        solve_optimum(**{"scenario": "two_clusters", **arguments})
     assert "\n" not in str(caught.value)
 
 
@@ -286,7 +302,7 @@ def test_halving_the_default_resolution_moves_no_value_by_two_parts_in_a_thousan
             assert fine[scheme][horizon].value == pytest.approx(optimum.value, rel=0.002)
 
 
-@pytest.mark.parametrize("schemes", [3, None, {"hybrid"}, []])
-def test_schemes_are_a_name_or_a_list_of_names(schemes: Any) -> None:
-    with pytest.raises(InputError, match=r"^schemes[^\n]*expected[^\n]*hybrid"):
-        solve(without_fading(), schemes, resolution=10.0)
+@pytest.mark.parametrize("mode_rules", [3, None, {"hybrid"}, []])
+def test_mode_rules_are_a_name_or_a_list_of_names(mode_rules: Any) -> None:
+    with pytest.raises(InputError, match=r"^mode_rules[^\n]*expected[^\n]*hybrid"):
+        solve_optimum(without_fading(), mode_rules, resolution=10.0)

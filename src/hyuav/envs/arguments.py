@@ -1,12 +1,17 @@
 """What the environments accept as arguments, and how they answer anything else."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import torch
+from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SCHEMES
+
+LAYOUT = ("ue_positions", "legitimate_position", "helper_starts", "eavesdropper_positions")
+"""The fields of a scenario in which the rows of a batch may differ."""
 
 
 def as_scenario(scenario: Scenario | str) -> Scenario:
@@ -16,6 +21,30 @@ def as_scenario(scenario: Scenario | str) -> Scenario:
     if not isinstance(scenario, Scenario):
         raise InputTypeError(rejection("scenario", scenario, "a Scenario or a preset's name"))
     return scenario
+
+
+def as_scenarios(
+    scenario: Scenario | str | Sequence[Scenario | str], batch_size: torch.Size
+) -> tuple[Scenario, ...]:
+    """One scenario for all rows, or one for each row of the batch's first dimension.
+
+    Those of several rows differ in their nodes' positions only, and in no number of nodes.
+    """
+    if isinstance(scenario, Scenario | str) or not isinstance(scenario, Sequence):
+        return (as_scenario(scenario),)
+    scenarios = tuple(as_scenario(each) for each in scenario)
+    rows = batch_size[0] if batch_size else 0
+    if len(scenarios) != rows:
+        accepted = f"one scenario, or one for each of {rows} rows"
+        raise InputError(rejection("scenario", f"{len(scenarios)} scenarios", accepted))
+    for index, other in enumerate(scenarios):
+        for field in dataclasses.fields(Scenario):
+            first, own = (getattr(each, field.name) for each in (scenarios[0], other))
+            same = len(own) == len(first) if field.name in LAYOUT else own == first
+            if not same:
+                accepted = f"{field.name} as of scenario[0]: rows differ in positions only"
+                raise InputError(rejection(f"scenario[{index}].{field.name}", own, accepted))
+    return scenarios
 
 
 def as_batch_size(batch_size: int | Sequence[int]) -> torch.Size:
@@ -32,16 +61,26 @@ def as_batch_size(batch_size: int | Sequence[int]) -> torch.Size:
 def as_schemes(scheme: str | Sequence[str], batch_size: torch.Size) -> tuple[str, ...]:
     """One scheme for all rows, or one for each row of the batch's first dimension."""
     if isinstance(scheme, str):
-        require_choice("scheme", scheme, SCHEMES)
+        require_choice("scheme", scheme, MODE_RULES)
         return (scheme,)
     if not isinstance(scheme, Sequence):
-        raise InputTypeError(rejection("scheme", scheme, f"one of {', '.join(SCHEMES)}"))
+        raise InputTypeError(rejection("scheme", scheme, f"one of {', '.join(MODE_RULES)}"))
     for index, name in enumerate(scheme):
-        require_choice(f"scheme[{index}]", name, SCHEMES)
+        require_choice(f"scheme[{index}]", name, MODE_RULES)
     if not batch_size or len(scheme) != batch_size[0]:
         rows = batch_size[0] if batch_size else 0
         raise InputError(rejection("scheme", scheme, f"one name, or one for each of {rows} rows"))
     return tuple(scheme)
+
+
+def require_shape(name: str, values: Tensor, shape: Sequence[int]) -> None:
+    """Accept a tensor of this shape.
+
+    Raises:
+        InputError: it has another.
+    """
+    if values.shape != (expected := tuple(shape)):
+        raise InputError(rejection(name, tuple(values.shape), f"shape {expected}"))
 
 
 def as_device(device: torch.device | str | None) -> torch.device:

@@ -12,6 +12,7 @@ from torch.fx.experimental.proxy_tensor import make_fx
 from torchrl.envs import TransformedEnv
 
 from hyuav._support.recording import COMPILATION_ERRORS, compile_graph, has_compiler
+from hyuav.envs.arguments import require_shape
 from hyuav.envs.draws import GivenDraws
 
 Flight = Callable[..., tuple[Tensor, ...]]
@@ -46,10 +47,9 @@ class CompiledEnv(TransformedEnv):
         # What is found at the start is what a slot brings in which the helper stays there.
         before = self.full_state_spec.zero()
         before["position"] = self.base_env.start(tensordict)
-        before["action"] = torch.zeros_like(before["position"])
-        column = before["position"][..., :1]
-        before["step_count"] = torch.full_like(column, -1, dtype=torch.int64)
-        before["episode_reward"] = torch.zeros_like(column)
+        before["action"] = self.full_action_spec["action"].zero()
+        before["episode_reward"] = self.full_reward_spec["reward"].zero()
+        before["step_count"] = torch.full_like(before["episode_reward"], -1, dtype=torch.int64)
         after = self._flown(self._flight, before).exclude("reward")
         after["episode_reward"] = before["episode_reward"]
         if self.base_env.diagnostics:
@@ -76,20 +76,30 @@ class CompiledEnv(TransformedEnv):
         return [*keys, ("diagnostics", "edge_load")] if self.base_env.diagnostics else keys
 
     def _inputs(self, tensordict: TensorDictBase) -> list[Tensor]:
-        """The entries (k, *batch_size) that a slot starts from, as the graph reads memory."""
-        self.base_env.require_action(tensordict["action"])
+        """The entries (..., *batch_size) that a slot starts from, as the graph reads memory."""
+        action = self.full_action_spec["action"]
+        require_shape("action", tensordict["action"], action.shape)
         return [
-            tensordict[key]
-            .to(torch.int64 if key == "step_count" else torch.float32)
-            .movedim(-1, 0)
-            .contiguous()
+            self._batch_last(
+                tensordict[key].to(torch.int64 if key == "step_count" else torch.float32)
+            ).contiguous()
             for key in self._input_keys
         ]
+
+    def _batch_last(self, values: Tensor) -> Tensor:
+        """(*batch_size, ...) to (..., *batch_size)."""
+        rank = len(self.batch_size)
+        return values.permute(*range(rank, values.ndim), *range(rank))
+
+    def _batch_first(self, values: Tensor) -> Tensor:
+        """(..., *batch_size) to (*batch_size, ...)."""
+        inner = values.ndim - len(self.batch_size)
+        return values.permute(*range(inner, values.ndim), *range(inner))
 
     def _entries(self, keys: list[Any], values: tuple[Tensor, ...]) -> TensorDictBase:
         entries = TensorDict({}, batch_size=self.batch_size, device=self.device)
         for key, value in zip(keys, values, strict=False):
-            entries[key] = value.movedim(0, -1)
+            entries[key] = self._batch_first(value)
         return entries
 
     def _compile(self, tensordict: TensorDictBase) -> None:
@@ -114,7 +124,7 @@ class CompiledEnv(TransformedEnv):
         self._flight, self._eager = flight, False
 
     def _fly(self, *arguments: Tensor) -> tuple[Tensor, ...]:
-        """One slot, from and to entries (k, *batch_size)."""
+        """One slot, from and to entries (..., *batch_size)."""
         env, count = self.base_env, len(self._input_keys)
         draws = env.draws
         fading, tasks = draws.redeem(*arguments[count:])
@@ -128,7 +138,8 @@ class CompiledEnv(TransformedEnv):
         # What is returned is stored: the fading is drawn once, not again wherever it is used.
         outputs += [] if fading is None else [fading]
         return tuple(
-            values.movedim(-1, 0).clone(memory_format=torch.contiguous_format) for values in outputs
+            self._batch_last(values).clone(memory_format=torch.contiguous_format)
+            for values in outputs
         )
 
 

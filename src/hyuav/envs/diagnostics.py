@@ -1,18 +1,17 @@
 """What only an evaluation needs to know of a slot: who offloads, rates, energies, budgets."""
 
-from typing import NamedTuple
-
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 from torchrl.data import Binary, Composite, Unbounded
 
 from hyuav.physics import energy
-from hyuav.physics.motion import Move
-from hyuav.physics.slot import ModeOutcome, SecureOffloadingSystem, Tasks
+from hyuav.physics.scenario import Scenario
+from hyuav.physics.slot import SlotOutcome
+from hyuav.physics.tasks import Tasks
 
 
-def diagnostics_spec(batch_size: torch.Size, num_ues: int, device: torch.device) -> Composite:
+def diagnostics_spec(batch_size: torch.Size, scenario: Scenario, device: torch.device) -> Composite:
     """The spec of the ``diagnostics`` entry that :func:`diagnose` computes; zero after a reset.
 
     - ``offloading`` (U,) bool: z_u, the UEs that offload.
@@ -21,11 +20,12 @@ def diagnostics_spec(batch_size: torch.Size, num_ues: int, device: torch.device)
     - ``ue_energy`` (U,) J: of transmitting, or of local execution where a UE does not offload.
     - ``edge_load`` (1,) cycle: taken in this slot, computed in the next.
     - ``edge_energy`` (1,) J: of computing what was taken in the previous slot.
-    - ``helper_energy`` (1,) J: of flying and transmitting.
+    - ``helper_energy`` (H,) J: of flying and transmitting.
     - ``budget_violation`` (1,) int64: how many nodes spend more than E_u, E_L or E_H.
     """
+    num_ues = scenario.num_ues
     per_ue, per_slot = (*batch_size, num_ues), (*batch_size, 1)
-    scalars = ("relay_sum_rate", "jamming_sum_rate", "edge_load", "edge_energy", "helper_energy")
+    scalars = ("relay_sum_rate", "jamming_sum_rate", "edge_load", "edge_energy")
 
     def numbers(shape: tuple[int, ...], dtype: torch.dtype = torch.float32) -> Unbounded:
         return Unbounded(shape, dtype=dtype, device=device)
@@ -34,6 +34,7 @@ def diagnostics_spec(batch_size: torch.Size, num_ues: int, device: torch.device)
         offloading=Binary(num_ues, per_ue, dtype=torch.bool, device=device),
         secrecy_rate=numbers(per_ue),
         ue_energy=numbers(per_ue),
+        helper_energy=numbers((*batch_size, scenario.num_helpers)),
         budget_violation=numbers(per_slot, torch.int64),
         **{name: numbers(per_slot) for name in scalars},
         shape=batch_size,
@@ -41,43 +42,21 @@ def diagnostics_spec(batch_size: torch.Size, num_ues: int, device: torch.device)
     )
 
 
-class Slot(NamedTuple):
-    """One slot at the helper's position, in both modes and in the chosen one."""
-
-    position: Tensor
-    """(..., 2) m."""
-    distances: Tensor
-    """(..., U + 2) m."""
-    relay_mode: Tensor
-    """(..., 1) bool, whether the helper relays."""
-    relay: ModeOutcome
-    jamming: ModeOutcome
-    tasks: Tasks | None
-    """None where neither the edge's admission nor diagnostics need them."""
-    fading: Tensor | None
-    """(..., 3 U + 2) powers, or None where fading is off."""
-
-
 def diagnose(
-    system: SecureOffloadingSystem, flown: Move, slot: Slot, edge_load: Tensor
+    scenario: Scenario, slot: SlotOutcome, tasks: Tasks, edge_load: Tensor
 ) -> TensorDictBase:
     """Account for one slot; the entries are those of :func:`diagnostics_spec`.
 
     Args:
-        system: the scenario's equations.
-        flown: the slot's flight.
-        slot: what the slot brought, with its tasks.
+        scenario: that is flown.
+        slot: what the slot brought.
+        tasks: of the slot.
         edge_load: (..., 1) cycles that the edge server took in the previous slot.
     """
-    assert slot.tasks is not None
-    relay_mode, relay, jamming = slot.relay_mode, slot.relay, slot.jamming
-    cpu_cycles = slot.tasks.cpu_cycles
-    scenario = system.scenario
+    cpu_cycles, offloading = tasks.cpu_cycles, slot.offloading
     duration, num_ues = scenario.slot_duration, scenario.num_ues
-    offloading = torch.where(relay_mode, relay.offloading, jamming.offloading)
-    secrecy_rate = torch.where(relay_mode, relay.secrecy_rate, jamming.secrecy_rate)
     sending = torch.where(
-        relay_mode,
+        slot.relays,
         energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=True),
         energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=False),
     )
@@ -85,29 +64,29 @@ def diagnose(
     ue_energy = torch.where(offloading, sending, local)
     edge_energy = energy.computation_energy(edge_load / duration, scenario.capacitance, duration)
     transmitting = torch.where(
-        relay_mode,
+        slot.relays,
         energy.relay_energy(offloading, scenario.relay_power, duration).unsqueeze(-1),
         energy.jamming_energy(scenario.jamming_power, duration),
     )
-    flying = energy.flight_energy(flown.velocity, scenario.helper_mass, duration).unsqueeze(-1)
-    helper_energy = flying + transmitting
+    flying = energy.flight_energy(slot.control.velocity, scenario.helper_mass, duration)
+    helper_energy = flying + transmitting * slot.control.power
     violations = (
         (ue_energy > _rounded_up(scenario.ue_energy_budget)).sum(dim=-1, keepdim=True)
         + (edge_energy > _rounded_up(scenario.edge_energy_budget))
-        + (helper_energy > _rounded_up(scenario.helper_energy_budget))
+        + (helper_energy > _rounded_up(scenario.helper_energy_budget)).sum(dim=-1, keepdim=True)
     )
     return TensorDict(
         offloading=offloading,
-        secrecy_rate=secrecy_rate * offloading,
-        relay_sum_rate=relay.sum_rate.unsqueeze(-1),
-        jamming_sum_rate=jamming.sum_rate.unsqueeze(-1),
+        secrecy_rate=slot.secrecy_rate * offloading,
+        relay_sum_rate=slot.relay.sum_rate.unsqueeze(-1),
+        jamming_sum_rate=slot.jamming.sum_rate.unsqueeze(-1),
         ue_energy=ue_energy,
         edge_load=(cpu_cycles * offloading).sum(dim=-1, keepdim=True),
         edge_energy=edge_energy,
         helper_energy=helper_energy,
         budget_violation=violations,
-        batch_size=relay_mode.shape[:-1],
-        device=system.device,
+        batch_size=slot.relays.shape[:-1],
+        device=edge_load.device,
     )
 
 

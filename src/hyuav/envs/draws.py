@@ -8,7 +8,8 @@ from torch import Tensor
 
 from hyuav._support.randomness import GAMMA, derived_seed, polar, splitmix64, uniform
 from hyuav.physics.channel import RicianFading
-from hyuav.physics.slot import SecureOffloadingSystem, Tasks
+from hyuav.physics.slot import Physics
+from hyuav.physics.tasks import Tasks, tasks_at
 
 NUMBERS_AT_ONCE = 2**14
 """Drawn for as many slots as this suffices for, but at least one."""
@@ -19,48 +20,47 @@ NAMES = ("fading", "tasks")
 class Draws:
     """The random numbers of an environment.
 
-    Each number depends on its seed and its place alone: slot, row and link or task. So it does
-    not matter how many are drawn at once, and devices differ only in rounding.
+    Fading powers come in rows as :class:`hyuav.physics.channel.LinkRow` has them, ``links`` of
+    them. Each number depends on its seed and its place alone: slot, row and link or task. So it
+    does not matter how many are drawn at once, and devices differ only in rounding.
 
     Args:
-        system: whose fading and tasks are drawn.
+        physics: whose fading and tasks are drawn.
         seeds: of D groups of helpers.
         inner: shape of each group.
     """
 
-    def __init__(
-        self, system: SecureOffloadingSystem, seeds: Sequence[int], inner: torch.Size
-    ) -> None:
-        self._system, self._rank = system, 1 + len(inner)
+    def __init__(self, physics: Physics, seeds: Sequence[int], inner: torch.Size) -> None:
+        self._physics, self._rank = physics, 1 + len(inner)
         keys = [[derived_seed(seed, name) for seed in seeds] for name in NAMES]
         self._keys = self._tensor(keys).reshape(len(NAMES), len(seeds), *(1 for _ in inner))
-        num_ues, device = system.scenario.num_ues, system.device
-        per_slot = len(seeds) * inner.numel() * (3 * num_ues + 2)
+        widths, device = (physics.link_row.size, 2 * physics.scenario.num_ues), physics.device
+        per_slot = len(seeds) * inner.numel() * widths[0]
         self._at_once = max(NUMBERS_AT_ONCE // per_slot, 1)
         self._places = {}
-        for name, width in zip(NAMES, (3 * num_ues + 2, 2 * num_ues), strict=True):
+        for name, width in zip(NAMES, widths, strict=True):
             columns = torch.arange(1, width + 1, device=device).reshape(-1, *(1,) * self._rank)
             helpers = torch.arange(inner.numel(), device=device).reshape(inner)
             self._places[name] = columns * GAMMA, helpers * width * GAMMA, inner.numel() * width
         trailing = (1,) * self._rank
-        self._law = RicianFading(*(values.reshape(-1, *trailing) for values in system.fading_law))
+        self._law = RicianFading.of(physics.k_factor.reshape(-1, *trailing))
         self._slots = dict.fromkeys(NAMES, 0)
         self._blocks: dict[str, tuple[int, Tensor]] = {}
 
     def _tensor(self, values: object) -> Tensor:
-        return torch.tensor(values, device=self._system.device)
+        return torch.tensor(values, device=self._physics.device)
 
     def fading(self) -> Tensor | None:
-        """The next slot's fading powers: (*batch_size, 3 U + 2), or None where fading is off."""
-        return self._spread(self._next("fading")) if self._system.scenario.fading else None
+        """The next slot's fading powers: (*batch_size, links), or None where fading is off."""
+        return self._spread(self._next("fading")) if self._physics.scenario.fading else None
 
     def tasks(self) -> Tasks:
         """The next slot's tasks, each (*batch_size, U)."""
         return self._as_tasks(self._spread(self._next("tasks")))
 
     def take_fading(self, count: int) -> Tensor | None:
-        """The fading of the next ``count`` slots: (count, *batch_size, 3 U + 2)."""
-        return self._spread(self._take("fading", count)) if self._system.scenario.fading else None
+        """The fading of the next ``count`` slots: (count, *batch_size, links)."""
+        return self._spread(self._take("fading", count)) if self._physics.scenario.fading else None
 
     def take_tasks(self, count: int) -> Tensor:
         """The tasks of the next ``count`` slots: (count, rows, 2, ..., U), sizes and cycles."""
@@ -70,14 +70,14 @@ class Draws:
     def ticket(self, *, tasks: bool) -> tuple[Tensor, Tensor]:
         """What decides the next slot's fading and, if wanted, tasks; it counts as drawn."""
         slots = self._tensor([*self._slots.values()])
-        self._slots["fading"] += self._system.scenario.fading
+        self._slots["fading"] += self._physics.scenario.fading
         self._slots["tasks"] += tasks
         return self._keys, slots
 
     def redeem(self, keys: Tensor, slots: Tensor) -> tuple[Tensor | None, Tasks]:
         """The fading and tasks of a ticket, by tensor operations that a graph can record."""
         fading = None
-        if self._system.scenario.fading:
+        if self._physics.scenario.fading:
             fading = self._spread(self._numbers("fading", keys[0], slots[0]))
         return fading, self._as_tasks(self._spread(self._numbers("tasks", keys[1], slots[1])))
 
@@ -121,26 +121,26 @@ class Draws:
         column, helper, per_slot = self._places[name]
         bits = splitmix64(helper + (keys + slots * per_slot * GAMMA) + column)
         if name == "fading":
-            numbers = self._law.power(*polar(bits, self._system.dtype))
+            numbers = self._law.power(*polar(bits, self._physics.dtype))
         else:
-            numbers = uniform(bits).to(self._system.dtype)
+            numbers = uniform(bits).to(self._physics.dtype)
         return numbers.movedim(-1 - self._rank, -1)
 
     def _as_tasks(self, levels: Tensor) -> Tasks:
-        return self._system.tasks_of(*levels.chunk(2, dim=-1))
+        return tasks_at(self._physics.scenario, *levels.chunk(2, dim=-1))
 
 
 class BatchDraws(Draws):
     """One seed for the whole batch.
 
     Args:
-        system: whose fading and tasks are drawn.
+        physics: whose fading and tasks are drawn.
         batch_size: of the helpers flown at once.
         seed: of all numbers.
     """
 
-    def __init__(self, system: SecureOffloadingSystem, batch_size: torch.Size, seed: int) -> None:
-        super().__init__(system, [seed], batch_size)
+    def __init__(self, physics: Physics, batch_size: torch.Size, seed: int) -> None:
+        super().__init__(physics, [seed], batch_size)
 
     def _spread(self, numbers: Tensor) -> Tensor:
         return numbers.squeeze(-1 - self._rank)
@@ -153,17 +153,15 @@ class RowDraws(Draws):
     fading and a row keeps its numbers whatever other rows there are.
 
     Args:
-        system: whose fading and tasks are drawn.
+        physics: whose fading and tasks are drawn.
         batch_size: of the helpers flown at once, of at least one dimension.
         seeds: of the rows.
     """
 
-    def __init__(
-        self, system: SecureOffloadingSystem, batch_size: torch.Size, seeds: Sequence[int]
-    ) -> None:
+    def __init__(self, physics: Physics, batch_size: torch.Size, seeds: Sequence[int]) -> None:
         distinct = list(dict.fromkeys(seeds))
-        super().__init__(system, distinct, batch_size[1:])
-        self._rows = torch.tensor([distinct.index(seed) for seed in seeds], device=system.device)
+        super().__init__(physics, distinct, batch_size[1:])
+        self._rows = torch.tensor([distinct.index(seed) for seed in seeds], device=physics.device)
 
     def _spread(self, numbers: Tensor) -> Tensor:
         axis = numbers.ndim - 1 - self._rank
@@ -181,7 +179,7 @@ class GivenDraws:
     """One slot's fading and tasks, for an environment whose slot is recorded.
 
     Args:
-        fading: powers (*batch_size, 3 U + 2), or None where fading is off.
+        fading: powers (*batch_size, links), or None where fading is off.
         tasks: of the slot, or None where none are needed.
     """
 

@@ -23,7 +23,7 @@ RENDERING: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4}
 
 
 class Flights:
-    """The flights of one helper, B = (), or of a batch of helpers, B = (N,).
+    """Flights with one helper each: a single one, B = (), or a batch of them, B = (N,).
 
     Args:
         env: from :func:`hyuav.make_env`, of batch shape B.
@@ -53,25 +53,27 @@ class Flights:
 
         A distance is at most the map's diagonal, sqrt(8) of the half sides it is measured in.
         """
-        size = self.env.observation_spec["observation"].shape[-1]
-        low, high = np.full(size, -1.0, np.float32), np.ones(size, np.float32)
-        high[3 : 5 + self.scenario.num_ues] = math.sqrt(8.0) - 1.0 + 1e-5  # float32 rounding
-        return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (2,), np.float32)
+        layout = self.env.transform[-1].layout
+        high = torch.ones(layout.size)
+        layout.distances(high).fill_(math.sqrt(8.0) - 1.0 + 1e-5)  # float32 rounding
+        observed = Box(np.full(layout.size, -1.0, np.float32), high.numpy(), dtype=np.float32)
+        return observed, Box(-1.0, 1.0, (layout.action_size,), np.float32)
 
     def reset(self, seed: int | None, position: ArrayLike | None, mask: Flags | None) -> None:
         """Start anew at ``position`` (2,) or (*B, 2) m, only in the rows of ``mask`` (*B,)."""
         if seed is not None:
             self.env.set_seed(seed, static_seed=True)
         shape = (*self.env.batch_size, 2)
-        start = self.env.base_env.system.helper_start
+        start = self.env.base_env.start(None)
         if position is not None:
-            start = _as_tensor("position", position, ((2,), shape), self.env.device)
+            given = _as_tensor("position", position, ((2,), shape), self.env.device)
+            start = given.expand(shape).unsqueeze(-2)
         if mask is None:
-            entries = TensorDict(position=start.expand(shape), batch_size=self.env.batch_size)
+            entries = TensorDict(position=start, batch_size=self.env.batch_size)
         else:
             rows = torch.tensor(mask, device=self.env.device).unsqueeze(-1)
             entries = self.state.copy()
-            entries["position"] = torch.where(rows, start, entries["position"])
+            entries["position"] = torch.where(rows.unsqueeze(-1), start, entries["position"])
             entries["_reset"] = rows
             if self._recorder is not None:
                 self._recorder.drop_last()
@@ -96,7 +98,7 @@ class Flights:
         """The entries of ``info``, arrays of leading shape B; ``secrecy_sum_rate`` is (*B,)."""
         return {
             # Copied because the caller may write to it, and the next slot starts from it.
-            "position": self.state["position"].numpy(force=True).copy(),
+            "position": self._position().copy(),
             "mode": _column(self.state["mode"]),
             "off_map": _column(self.state["off_map"]),
             "secrecy_sum_rate": secrecy_sum_rate,
@@ -110,7 +112,11 @@ class Flights:
     def _enter(self, state: TensorDictBase) -> None:
         self._state = state
         if self._recorder is not None:
-            self._recorder.add(state["position"].numpy(force=True), _column(state["mode"]))
+            self._recorder.add(self._position(), _column(state["mode"]))
+
+    def _position(self) -> Floats:
+        """Where the helper is: (*B, 2) m."""
+        return self.state["position"].squeeze(-2).numpy(force=True)
 
 
 def accepted_options(options: object, names: Sequence[str]) -> Mapping[str, Any]:

@@ -41,7 +41,7 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
         - ``off_map``: the last flight would have left the map and was turned back.
         - ``secrecy_sum_rate``, bps/Hz: the reward before the penalty; 0 after a reset.
 
-    Reset options: ``position`` (2,) m, where to start instead of at ``helper_start``.
+    Reset options: ``position`` (2,) m, where to start instead of at ``helper_starts[0]``.
 
     ``reset(seed=s)`` starts the random numbers that ``make_env(seed=s)`` would draw; without a
     seed, they go on.

@@ -68,7 +68,7 @@ def draw_scenario(axes: Axes, scenario: Scenario, covered: ArrayLike | None = No
     axes.grid(color="0.92", linewidth=_width(0.5))
     draw_coverage(axes, scenario.legitimate_position, scenario.coverage_radius, LEGITIMATE_COLOR)
     _draw_uav(axes, scenario.legitimate_position, LEGITIMATE_LABEL, _LEGITIMATE)
-    _draw_uav(axes, scenario.eavesdropper_position, EAVESDROPPER_LABEL, _EAVESDROPPER)
+    _draw_uav(axes, scenario.eavesdropper_positions[0], EAVESDROPPER_LABEL, _EAVESDROPPER)
     if covered is None:
         _draw_ues(axes, np.asarray(scenario.ue_positions), UE_COLOR, "UE")
         return

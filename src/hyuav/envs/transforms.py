@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor
-from torchrl.data import Composite, Unbounded
 from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
 from hyuav._support.parameters import switch
 from hyuav.envs.compiled import CompiledEnv
+from hyuav.envs.observation import JointView
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.physics.scenario import Scenario
 
@@ -18,9 +18,9 @@ WITHIN = 1.0 - 1e-6
 
 
 class OffMapPenalty(Transform):
-    """Subtract r_om from the reward of every slot in which the flight would have left the map.
+    """Subtract r_om from the reward of a slot for each helper that would have left the map.
 
-    Reads ``off_map`` (..., 1) and changes ``reward`` (..., 1) in bps/Hz.
+    Reads ``off_map`` (..., H) and changes ``reward`` (..., 1) in bps/Hz.
 
     Args:
         penalty: r_om in bps/Hz.
@@ -32,7 +32,7 @@ class OffMapPenalty(Transform):
 
     def _step(self, _: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
         """Apply the penalty to the step that was just taken."""
-        penalty = self.penalty * next_tensordict["off_map"]
+        penalty = self.penalty * next_tensordict["off_map"].sum(dim=-1, keepdim=True)
         next_tensordict["reward"] = next_tensordict["reward"] - penalty
         return next_tensordict
 
@@ -53,9 +53,9 @@ def fenced(scenario: Scenario, position: Tensor, action: Tensor) -> Tensor:
 class Geofence(Transform):
     """Slow the flight, component by component, so that it ends on the map.
 
-    Changes ``action`` (..., 2) on its way to the environment, given ``position`` (..., 2) m. A
-    helper that is sent beyond the edge flies to it or glides along it, where without the fence it
-    would be turned back and pay the penalty.
+    Changes ``action`` (..., H, 2) on its way to the environment, given ``position`` (..., H, 2) in
+    m. A helper that is sent beyond the edge flies to it or glides along it, where without the fence
+    it would be turned back and pay the penalty.
 
     Args:
         scenario: its map, speed limit and slot duration.
@@ -71,52 +71,8 @@ class Geofence(Transform):
         return tensordict
 
 
-class NormalizedObservation(Transform):
-    """Gather ``observation`` (U + 5,) and bring each entry to order one by constants alone.
-
-    Coordinates are divided by half the map's side, the mode becomes -1 (jamming) or 1 (relay),
-    and distances from 0 to the map's side become -1 to 1. With a clock, the slots flown follow
-    as one more entry from -1 (none) to 1 (all).
-
-    Args:
-        scenario: its map and horizon.
-        clock: append the slots flown.
-    """
-
-    def __init__(self, scenario: Scenario, *, clock: bool) -> None:
-        keys = ["position", "mode", "distances", *(["step_count"] if clock else [])]
-        super().__init__(in_keys=keys, out_keys=["observation"])
-        self._size = scenario.num_ues + 5 + clock
-        self._half_side = scenario.map_side / 2
-        self._half_horizon = scenario.num_slots / 2 if clock else None
-
-    def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the observation beside the entries that it is made of."""
-        parts = [
-            next_tensordict["position"] / self._half_side,
-            next_tensordict["mode"] * 2.0 - 1.0,
-            next_tensordict["distances"] * (1.0 / self._half_side) - 1.0,
-        ]
-        if self._half_horizon is not None:
-            parts.append(next_tensordict["step_count"] / self._half_horizon - 1.0)
-        next_tensordict["observation"] = torch.cat(parts, dim=-1)
-        return next_tensordict
-
-    def _reset(self, _: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
-        """Observe the start as well."""
-        return self._call(tensordict_reset)
-
-    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
-        """Add the observation to the specs."""
-        shape = (*observation_spec.shape, self._size)
-        observation_spec["observation"] = Unbounded(
-            shape, dtype=torch.float32, device=observation_spec.device
-        )
-        return observation_spec
-
-
 def make_env(
-    scenario: Scenario | str,
+    scenario: Scenario | str | Sequence[Scenario | str],
     scheme: str | Sequence[str] = "hybrid",
     batch_size: int | Sequence[int] = (),
     device: torch.device | str | None = None,
@@ -130,10 +86,11 @@ def make_env(
 ) -> TransformedEnv:
     """The environment as a learner sees it: :class:`SecureOffloadingEnv` with its transforms.
 
-    To the entries of the environment are added ``observation`` (U + 5,) float32, the position,
-    mode and distances normalized to order one; ``episode_reward`` (1,), the return so far in
-    bps/Hz; and ``step_count`` (1,), the slots flown. ``reward`` carries the off-map penalty, and
-    after T slots the episode is truncated; it never terminates.
+    To the entries of the environment are added ``observation`` float32, the positions, modes and
+    distances normalized to order one, as :class:`hyuav.envs.observation.ObservationLayout` has
+    them; ``episode_reward`` (1,), the return so far in bps/Hz; and ``step_count`` (1,), the slots
+    flown. ``action`` (2 H,) steers all helpers. ``reward`` carries the off-map penalty, and after
+    T slots the episode is truncated; it never terminates.
 
     Args:
         scenario: as for :class:`SecureOffloadingEnv`, like the following five.
@@ -143,7 +100,7 @@ def make_env(
         seed: of fading and tasks, one for all or one per row.
         diagnostics: compute the ``diagnostics`` entry too.
         fading: give the ``fading`` entry too.
-        clock: append the slots flown to ``observation``, which then has U + 6 entries.
+        clock: append the slots flown to ``observation``, which then has one number more.
         geofence: slow flights so that they end on the map; see :class:`Geofence`.
         compiled: run each slot as one compiled graph, which takes half a minute in the first step
             and pays for batches of thousands that fly thousands of slots.
@@ -162,7 +119,7 @@ def make_env(
             OffMapPenalty(env.scenario.off_map_penalty),
             RewardSum(),
             StepCounter(max_steps=env.scenario.num_slots),
-            NormalizedObservation(env.scenario, clock=clock),
+            JointView(env.scenario, clock=clock),
         ),
         device=env.device,
     )

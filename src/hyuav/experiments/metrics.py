@@ -14,7 +14,7 @@ import pandas as pd
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.files import open_regular, read_regular, sync, write_all, write_durably
-from hyuav.physics.slot import SCHEMES
+from hyuav.physics.offloading import MODE_RULES
 
 METRIC_COLUMNS = (
     "episode",
@@ -157,7 +157,7 @@ def read_metrics(path: Path) -> pd.DataFrame:
             metrics.empty
             or (
                 set(metrics.select_dtypes("number")) >= METRIC_NUMBERS  # truth values are none
-                and metrics["scheme"].isin(SCHEMES).all()
+                and metrics["scheme"].isin(MODE_RULES).all()
             )
         )
         reason = "" if whole else "damaged"

@@ -14,7 +14,7 @@ from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import FlightPolicy, solve
+from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
 
@@ -100,7 +100,7 @@ def reference_policies(
     for line in left_out:
         print_line(line, console)
     with make_progress(console, "optima") as progress:
-        optima = solve(scenario, resolution=resolution, track=progress.track)
+        optima = solve_optimum(scenario, resolution=resolution, track=progress.track)
     for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [Policy(FlightPolicy(optimum.path, scenario))]
     return policies

@@ -3,9 +3,10 @@
 import torch
 from torch import Tensor, nn
 
+from hyuav.envs.observation import ObservationLayout
 from hyuav.envs.transforms import fenced
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Physics
 
 BLUR = 0.02
 """Of the coverage's edge, in units of the map's side; so that a gradient is felt beside it."""
@@ -30,47 +31,50 @@ class Afterstate(nn.Module):
 
     def __init__(self, scenario: Scenario, *, clock: bool, geofence: bool) -> None:
         super().__init__()
-        self._system = SecureOffloadingSystem(scenario, torch.get_default_device())
-        self._norm_limit = self._system.norm_limit(["hybrid"])
+        self._physics = Physics(scenario, torch.get_default_device())
+        self._norm_limit = self._physics.norm_limit(["hybrid"])
+        self._layout = ObservationLayout(scenario, clock=clock)
         self._clock, self._geofence = clock, geofence
         self.num_ues = scenario.num_ues
-        self.size = 2 * self.num_ues + 5 + clock
+        self.size = self._layout.size + self.num_ues
 
     def forward(self, observation: Tensor, action: Tensor) -> Tensor:
-        """Map observations (..., U + 5) and actions (..., 2) to features (..., 2 U + 5).
+        """Map observations and actions (..., 2) to features (..., size).
 
         In order: the position, the distances to the UEs, L and E, the coverage of each UE, and
         whether the map was left (1, otherwise -1), and with a clock the slots flown; all of order
         one.
         """
-        scenario = self._system.scenario
-        position = observation[..., :2] * (scenario.map_side / 2)
+        scenario = self._physics.scenario
+        position = self._layout.position(observation) * (scenario.map_side / 2)
         if self._geofence:
             action = fenced(scenario, position, action)
-        moved = self._system.move(position, action, self._norm_limit)
+        moved = self._physics.move(position, self._physics.velocity(action, self._norm_limit))
         beside = moved.off_map.unsqueeze(-1) * 2.0 - 1.0
-        return self._features(moved.position, beside, observation[..., -1:])
+        return self._features(moved.position, beside, self._layout.clock(observation))
 
     def at(self, place: Tensor, clock: Tensor) -> Tensor:
-        """The features (..., 2 U + 5) of having flown somewhere on the map.
+        """The features (..., size) of having flown somewhere on the map.
 
         Args:
             place: (..., 2) in units of half the map's side.
             clock: (..., 1), what the clock shows; without one it does not matter.
         """
-        position = place * (self._system.scenario.map_side / 2)
+        position = place * (self._physics.scenario.map_side / 2)
         return self._features(position, torch.full_like(clock, -1.0), clock)
 
     def coverage(self, features: Tensor) -> Tensor:
         """How far the helper covers each UE there, from 0 to 1: (..., U), of features (..., F)."""
-        shown = features[..., self.num_ues + 4 : 2 * self.num_ues + 4]
+        first = 2 + self._layout.num_distances
+        shown = features[..., first : first + self.num_ues]
         return 0.5 * (shown + 1.0)
 
     def _features(self, position: Tensor, beside: Tensor, clock: Tensor) -> Tensor:
-        scenario = self._system.scenario
+        scenario = self._physics.scenario
         half_side = scenario.map_side / 2
-        distances = self._system.distances(position)
-        inside = scenario.coverage_radius - distances[..., : scenario.num_ues]
+        nodes = self._physics.nodes._replace(helper=position.unsqueeze(-2))
+        distances = self._physics.distances(nodes).squeeze(-2)
+        inside = scenario.coverage_radius - self._physics.by_role(distances)[0]
         features = [
             position / half_side,
             distances / half_side - 1.0,

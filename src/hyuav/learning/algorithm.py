@@ -17,6 +17,7 @@ from torch import Tensor, nn
 from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 
 from hyuav._support.parameters import Parameters, choice, count, number, parameter, sequence, switch
+from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.exploration import WarmUp
 from hyuav.learning.guide.control_variate import ControlVariate
@@ -109,8 +110,8 @@ class AlgorithmParameters(Parameters, ABC):
         return algorithm
 
     def observation_size(self, scenario: Scenario) -> int:
-        """U + 5, or U + 6 with a clock."""
-        return scenario.num_ues + 5 + self.clock
+        """Numbers of an observation."""
+        return ObservationLayout(scenario, clock=self.clock).size
 
     def make_critic(self, learners: int, scenario: Scenario) -> TensorDictModule:
         """Q(s, a) of N learners, as :func:`hyuav.learning.networks.make_critic` describes it."""

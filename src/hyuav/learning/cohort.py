@@ -18,6 +18,7 @@ from hyuav._support.randomness import (
     standard_normal,
     uniform,
 )
+from hyuav.envs.observation import ObservationLayout
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.compile import CompiledSlots, Flown, all_finite
@@ -34,8 +35,8 @@ from hyuav.learning.weights import (
     load_weights,
     replace_learners,
 )
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SCHEMES
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Learner(Parameters):
     or horizon begin with the same weights and meet the same luck.
     """
 
-    scheme: str = parameter(choice(*SCHEMES), "hybrid")
+    scheme: str = parameter(choice(*MODE_RULES), "hybrid")
     seed: int = parameter(count(0), 0)
     num_slots: int | None = parameter(optional(count()), None, symbol="T")
     """The horizon; the scenario's where it is None."""
@@ -88,6 +89,7 @@ class Cohort:
         device: torch.device | str | None,
     ) -> None:
         self.scenario, self.learners = scenario, tuple(learners)
+        self._layout = ObservationLayout(scenario, clock=algorithm.clock)
         self._options = {"clock": algorithm.clock, "geofence": algorithm.geofence}
         learning = {**self._options, "fading": algorithm.control_variate}
         self.batch_size = batch_size
@@ -146,8 +148,8 @@ class Cohort:
         if flights is None or expectation is None:
             return None
         imagined = self.algorithm.parameters.imagined_flights
-        system = self.env.base_env.system
-        imagination = Imagination(imagined, system, schemes) if imagined else None
+        physics = self.env.base_env.physics
+        imagination = Imagination(imagined, physics, schemes) if imagined else None
         return FlightSearch(flights, expectation, imagination, seeds)
 
     def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -216,7 +218,7 @@ class Cohort:
             imagines = self.episode >= self.algorithm.parameters.warm_up_episodes
             self._search.go_on(flown, storage[: len(self.replay)], self.episode, imagines=imagines)
             return
-        way = flown["next", "observation"][..., :2]
+        way = self._layout.position(flown["next", "observation"])
         flights.keep(flown["action"], way, flown["next", "reward"].sum(dim=(0, 2)))
         flights.try_best()
 
@@ -241,7 +243,7 @@ class Cohort:
             blocks["plan"] = self._plan()
         if self.scenario.fading:
             blocks["fading"] = draws.take_fading(slots).contiguous()  # where rows are shared
-        if self.env.base_env.system.edge_can_saturate:
+        if self.env.base_env.physics.edge_can_saturate:
             blocks["tasks"] = draws.take_tasks(slots).contiguous()
         carrier = self.collector._carrier
         flown = compiled.fly(carrier, blocks, self.updates)
@@ -303,7 +305,7 @@ class Cohort:
                 luck += expectation.variate.luck(slot).mean(dim=(1, 2))
             state = env.step_mdp(slot)
             off_map += state["off_map"].squeeze(-1).float().mean(dim=-1)
-            way.append(state["observation"][:, 0, :2])
+            way.append(self._layout.position(state["observation"])[:, 0])
         reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
         sum_rate = reward + self.scenario.off_map_penalty * off_map
         fair = reward - luck / self.algorithm.parameters.reward_scale

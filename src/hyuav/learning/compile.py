@@ -23,7 +23,7 @@ from hyuav.envs.draws import GivenDraws
 from hyuav.learning.algorithm import Algorithm, GradientStep
 from hyuav.learning.guide.demonstrations import as_planned
 from hyuav.learning.replay import sampled_slots
-from hyuav.physics.slot import Tasks
+from hyuav.physics.tasks import Tasks
 
 
 class Flown(NamedTuple):
@@ -99,7 +99,7 @@ class CompiledSlots:
                 normal, where the explorer draws n times; ``sampling`` (slots, N, K), uniform;
                 ``losses`` (slots, N, n, K, 2), standard normal, where the losses draw n times;
                 ``plan`` (slots, N, 2), actions to take whatever the explorer says, NaN for none,
-                where the algorithm repeats flights; ``fading`` (slots, N, 3 U + 2) and ``tasks``
+                where the algorithm repeats flights; ``fading`` (slots, N, links) and ``tasks``
                 (slots, N, 2, U) where the environment needs them.
             updates: taken before.
         """
@@ -147,8 +147,8 @@ class CompiledSlots:
     def _examples(self, batch_size: int) -> dict[str, Tensor]:
         """Tensors of the shapes in which a slot's random numbers come."""
         learners, device = self._env.batch_size[0], self._env.device
-        system, steps = self._env.base_env.system, self._algorithm.steps
-        num_ues, normals = system.scenario.num_ues, sum(step.normals for step in steps)
+        physics, steps = self._env.base_env.physics, self._algorithm.steps
+        normals = sum(step.normals for step in steps)
         shapes: dict[str, tuple[int, ...]] = {
             "exploration": (learners, self._algorithm.parameters.explorer_normals, 2),
             "sampling": (learners, batch_size),
@@ -158,10 +158,10 @@ class CompiledSlots:
             shapes["plan"] = (learners, 2)
         if normals:
             shapes["losses"] = (learners, normals, batch_size, 2)
-        if system.scenario.fading:
-            shapes["fading"] = (learners, 3 * num_ues + 2)
-        if system.edge_can_saturate:
-            shapes["tasks"] = (learners, 2, num_ues)
+        if physics.scenario.fading:
+            shapes["fading"] = (learners, physics.link_row.size)
+        if physics.edge_can_saturate:
+            shapes["tasks"] = (learners, 2, physics.scenario.num_ues)
         return {name: torch.zeros(shape, device=device) for name, shape in shapes.items()}
 
     @torch.no_grad()

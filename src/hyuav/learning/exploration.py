@@ -90,7 +90,7 @@ class WarmUp(TensorDictModuleBase):
         self.register_buffer("multiples", torch.tensor(EVENLY), persistent=False)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Read ``action`` (N, 2), ``step_count`` (N, 1) and ``position`` (N, 2) m; act."""
+        """Read ``action`` (N, 2), ``step_count`` (N, 1) and ``position`` (N, 1, 2) m; act."""
         action, begins = tensordict["action"], tensordict["step_count"] == 0
         normal = torch.randn_like(action)
         anywhere = torch.special.ndtr(normal)
@@ -98,7 +98,7 @@ class WarmUp(TensorDictModuleBase):
         self.episode.add_(begins)
         share = torch.frac(self.origin + self.episode * self.multiples)
         destination = destinations(share) * self._half_side
-        towards = (destination - tensordict["position"]) / self._reach
+        towards = (destination - tensordict["position"].flatten(-2)) / self._reach
         flown = (towards + JITTER * normal).clamp(-1.0, 1.0)
         tensordict["action"] = torch.where(self.episode > self._episodes, action, flown)
         return tensordict

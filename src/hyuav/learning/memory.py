@@ -6,9 +6,12 @@ import torch
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.machine import device_memory
+from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.guide.control_variate import HIDDEN_SIZES
 from hyuav.learning.guide.reward_model import MANY_UES, POLYNOMIAL
+from hyuav.physics.channel import LinkRow
+from hyuav.physics.scenario import Scenario
 
 COPIES = 16
 """Of the weights of the largest network: networks, targets, moments, gradients and best weights."""
@@ -18,7 +21,7 @@ _FLOAT = 4
 
 
 def require_memory(
-    num_ues: int,
+    scenario: Scenario,
     horizons: tuple[int, ...],
     algorithm: AlgorithmParameters,
     sizes: dict[str, int],
@@ -27,7 +30,7 @@ def require_memory(
     """Accept a training that the device can hold.
 
     Args:
-        num_ues: U.
+        scenario: that is flown.
         horizons: T of each learner.
         algorithm: whose networks are built for each.
         sizes: ``replay_size``, ``batch_size`` and ``evaluation_episodes``.
@@ -36,8 +39,9 @@ def require_memory(
     Raises:
         InputError: naming what takes most, and how much there is.
     """
-    learners, observed = len(horizons), num_ues + 6
-    faded = (3 * num_ues + 2) * algorithm.control_variate
+    learners, num_ues = len(horizons), scenario.num_ues
+    observed = ObservationLayout(scenario, clock=True).size
+    faded = LinkRow.of(scenario).size * algorithm.control_variate
     imagined = 2 * algorithm.imagined_flights * algorithm.control_variate
     regressed = HIDDEN_SIZES[-1] + 1 + POLYNOMIAL * num_ues * (num_ues <= MANY_UES)
     inputs = 2 * observed if algorithm.afterstate else observed + 2

@@ -141,9 +141,7 @@ class Training:
         if algorithm.keeps_flights and parameters.replay_size < longest:
             accepted = f"at least the {longest} slots of a flight, to keep the best"
             raise InputError(rejection("replay_size", parameters.replay_size, accepted))
-        require_memory(
-            scenario.num_ues, self.horizons, algorithm, parameters.sizes, as_device(device)
-        )
+        require_memory(scenario, self.horizons, algorithm, parameters.sizes, as_device(device))
         self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
         self.cohorts = [
             Cohort(

@@ -1,16 +1,84 @@
-"""Distances and channel power gains: the paper's equations 3 and 4.
+"""Distances, channel power gains and fading of all links: the paper's equations 3 and 4.
 
 All functions take tensors with any leading batch shape (written ``...``), in float32 or float64.
 """
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import torch
 from torch import Tensor
 
+from hyuav.physics.scenario import Scenario
+
 REFERENCE_DISTANCE = 1.0
 """d_0 in metres: the distance at which the reference gains beta_0 and beta_1 are received."""
+
+
+class Links(NamedTuple):
+    """One number for each link of a slot: channel power gains, or fading powers.
+
+    U is the number of UEs, H of helpers, E of eavesdroppers.
+    """
+
+    ue_legitimate: Tensor
+    """(..., U), g_{u,L}."""
+    ue_helper: Tensor
+    """(..., U, H), g_{u,H}."""
+    ue_eavesdropper: Tensor
+    """(..., U, E), g_{u,E}."""
+    helper_legitimate: Tensor
+    """(..., H), g_{H,L}."""
+    helper_eavesdropper: Tensor
+    """(..., H, E), g_{H,E}."""
+
+    def faded(self, fading: "Links | None") -> "Links":
+        """These path gains times the fading powers; as they are where fading is off."""
+        if fading is None:
+            return self
+        return Links(*(gain * power for gain, power in zip(self, fading, strict=True)))
+
+
+class LinkRow(NamedTuple):
+    """How the numbers of all links lie in one row: in the order of :class:`Links`.
+
+    Random numbers are drawn and stored in rows (..., size).
+    """
+
+    num_ues: int
+    num_helpers: int
+    num_eavesdroppers: int
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """The row of a scenario's links."""
+        return cls(scenario.num_ues, scenario.num_helpers, scenario.num_eavesdroppers)
+
+    @property
+    def shapes(self) -> tuple[tuple[int, ...], ...]:
+        """The shape of each entry of :class:`Links`, without leading axes."""
+        ues, helpers, eavesdroppers = self
+        return (ues,), (ues, helpers), (ues, eavesdroppers), (helpers,), (helpers, eavesdroppers)
+
+    @property
+    def size(self) -> int:
+        """How many links there are."""
+        return sum(math.prod(shape) for shape in self.shapes)
+
+    def flatten(self, links: Links) -> Tensor:
+        """All numbers in one row: (..., size)."""
+        rows = zip(links, self.shapes, strict=True)
+        return torch.cat([values.flatten(-len(shape)) for values, shape in rows], dim=-1)
+
+    def unflatten(self, row: Tensor) -> Links:
+        """The numbers of a row (..., size) by link; they share its memory."""
+        parts = row.split([math.prod(shape) for shape in self.shapes], dim=-1)
+        return Links(
+            *(
+                part if len(shape) == 1 else part.unflatten(-1, shape)
+                for part, shape in zip(parts, self.shapes, strict=True)
+            )
+        )
 
 
 def horizontal_distance(position: Tensor, other: Tensor) -> Tensor:
@@ -27,8 +95,10 @@ def horizontal_distance(position: Tensor, other: Tensor) -> Tensor:
     return distance
 
 
-def path_gain(distance: Tensor, height_difference: float, reference_gain: float) -> Tensor:
-    """Path power gain beta / (h^2 + D^2): the first factor of eq. 3 and of eq. 4.
+def path_gain(
+    distance: Tensor, height_difference: float, reference_gain: float, exponent: float = 2.0
+) -> Tensor:
+    """Path power gain beta / (h^2 + D^2)^(alpha / 2): the first factor of eq. 3 and of eq. 4.
 
     The squared distance is clamped below by d_0^2, so that the gain stays finite where the
     helper flies straight above another UAV at its own altitude.
@@ -37,12 +107,25 @@ def path_gain(distance: Tensor, height_difference: float, reference_gain: float)
         distance: (...) horizontal distance in m.
         height_difference: in m.
         reference_gain: beta_0 or beta_1, the gain at d_0.
+        exponent: alpha; 2 in free space, as in the paper.
 
     Returns:
         (...) dimensionless.
     """
-    squared = distance.square() + height_difference**2
-    return squared.clamp(min=REFERENCE_DISTANCE**2).reciprocal() * reference_gain
+    squared = (distance.square() + height_difference**2).clamp(min=REFERENCE_DISTANCE**2)
+    loss = squared if exponent == 2.0 else squared.pow(exponent / 2)
+    return loss.reciprocal() * reference_gain
+
+
+def ground_to_air(scenario: Scenario, distance: Tensor, height_difference: float) -> Tensor:
+    """Path gain of a UE's link to a UAV (eq. 3 without fading); as :func:`path_gain`."""
+    gain, exponent = scenario.ground_to_air_gain, scenario.ground_to_air_exponent
+    return path_gain(distance, height_difference, gain, exponent)
+
+
+def air_to_air(scenario: Scenario, distance: Tensor, height_difference: float) -> Tensor:
+    """Path gain of a helper's link to another UAV (eq. 4 without fading)."""
+    return path_gain(distance, height_difference, scenario.air_to_air_gain)
 
 
 def k_factor_from_db(k_factor_db: float) -> float:

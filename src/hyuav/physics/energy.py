@@ -1,6 +1,9 @@
 """Energies of computing, transmitting and flying: the paper's equation 7 and section II-C."""
 
+import torch
 from torch import Tensor
+
+from hyuav.physics.scenario import Scenario
 
 
 def computation_energy(frequency: Tensor, capacitance: float, slot_duration: float) -> Tensor:
@@ -36,6 +39,22 @@ def jamming_energy(jamming_power: float, slot_duration: float) -> float:
     return jamming_power * slot_duration
 
 
+def ue_can_pay(scenario: Scenario, *, relay: bool) -> bool:
+    """Eq. 8e for a UE that offloads: the same for every UE, slot and position."""
+    spent = offloading_energy(
+        scenario.ue_power, scenario.slot_duration, scenario.num_ues, relay=relay
+    )
+    return spent <= scenario.ue_energy_budget
+
+
+def edge_can_saturate(scenario: Scenario) -> bool:
+    """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
+    cycles = scenario.num_ues * scenario.task_size[1] * scenario.cycles_per_bit[1]
+    frequency = torch.tensor(cycles / scenario.slot_duration, dtype=torch.float64)
+    spent = computation_energy(frequency, scenario.capacitance, scenario.slot_duration)
+    return bool(spent > scenario.edge_energy_budget)
+
+
 def flight_energy(velocity: Tensor, helper_mass: float, slot_duration: float) -> Tensor:
     """0.5 M Delta |v|^2 in J.
 
@@ -53,3 +72,20 @@ def flight_energy(velocity: Tensor, helper_mass: float, slot_duration: float) ->
 def speed_within_budget(energy: float, helper_mass: float, slot_duration: float) -> float:
     """The speed in m/s at which flying through a slot takes ``energy`` J; 0 below 0 J."""
     return float((max(energy, 0.0) / (0.5 * helper_mass * slot_duration)) ** 0.5)
+
+
+def budget_speed(scenario: Scenario, mode_rule: str) -> float:
+    """The speed in m/s at which flying and transmitting spend E_H in one slot (eq. 8g).
+
+    The mode is chosen after the move, so the dearer transmission open to ``mode_rule``, one of
+    :data:`hyuav.physics.offloading.MODE_RULES`, is set aside: jamming through the slot, or
+    relaying for every UE.
+    """
+    relaying = scenario.relay_power * scenario.slot_duration / 2
+    jamming = jamming_energy(scenario.jamming_power, scenario.slot_duration)
+    transmission = {"relay": relaying, "jamming": jamming, "hybrid": max(relaying, jamming)}
+    return speed_within_budget(
+        scenario.helper_energy_budget - transmission[mode_rule],
+        scenario.helper_mass,
+        scenario.slot_duration,
+    )

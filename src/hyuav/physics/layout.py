@@ -1,17 +1,64 @@
-"""Random UE layouts, for studies beyond the two presets."""
+"""Where the nodes are, and random UE layouts for studies beyond the two presets."""
 
 from collections.abc import Sequence
+from typing import NamedTuple, Self
 
 import torch
+from torch import Tensor
 
 from hyuav._support.parameters import count, number, sequence
 from hyuav._support.randomness import derived_seed
-from hyuav.physics.scenario import Point
+from hyuav.physics.scenario import Point, Scenario
 
 _length = number(0.0)
 _point = sequence(number(), "two coordinates (x, y) in metres", length=2)
 _ues = count(1, 10**6)
 _sizes = sequence(_ues, "the numbers of UEs of one cluster or more")
+
+
+class Nodes(NamedTuple):
+    """Positions in m by role, for U UEs, H helpers and E eavesdroppers.
+
+    The leading axes (...) of the four are broadcast against each other: where all flights of a
+    batch share a layout, the helpers alone have them.
+    """
+
+    ue: Tensor
+    """(..., U, 2), on the ground."""
+    legitimate: Tensor
+    """(..., 2), of L."""
+    helper: Tensor
+    """(..., H, 2)."""
+    eavesdropper: Tensor
+    """(..., E, 2)."""
+
+    @classmethod
+    def of(
+        cls,
+        scenario: Scenario,
+        device: torch.device | str | None = None,
+        dtype: torch.dtype = torch.float32,
+    ) -> Self:
+        """Where a scenario puts its nodes, the helpers at their starts; without leading axes."""
+        positions = (
+            scenario.ue_positions,
+            scenario.legitimate_position,
+            scenario.helper_starts,
+            scenario.eavesdropper_positions,
+        )
+        return cls(*(torch.tensor(each, device=device, dtype=dtype) for each in positions))
+
+    @classmethod
+    def in_rows(cls, layouts: Sequence[Self], batch_dims: int) -> Self:
+        """A layout for each row of a batch's first axis.
+
+        Args:
+            layouts: without leading axes, and of equal counts.
+            batch_dims: how many axes the batch has; all but the first are of length 1.
+        """
+        inner = (1,) * (batch_dims - 1)
+        rows = (torch.stack(positions) for positions in zip(*layouts, strict=True))
+        return cls(*(each.reshape(len(layouts), *inner, *each.shape[1:]) for each in rows))
 
 
 def disk(

@@ -1,9 +1,14 @@
 """The helper's motion: speed limits, the map (eq. 8c) and the flight budget (eq. 8g)."""
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
+
+from hyuav.physics.energy import budget_speed
+from hyuav.physics.scenario import Scenario
 
 
 class Move(NamedTuple):
@@ -15,6 +20,24 @@ class Move(NamedTuple):
     """(..., 2) m/s, as flown after the limits; kept where the map's edge turned the helper back."""
     off_map: Tensor
     """(...) bool, the flight would have left the map and ended where it began."""
+
+
+def norm_limits(scenario: Scenario, mode_rules: Sequence[str]) -> list[float] | None:
+    """The bounds on the norm of the velocity in m/s, from the speed limit and the budget E_H.
+
+    Args:
+        scenario: that is flown.
+        mode_rules: each a name of :data:`hyuav.physics.offloading.MODE_RULES`.
+
+    Returns:
+        one for each mode rule, or None where bounding each component by v_max suffices.
+    """
+    disc = scenario.speed_limit == "disc"
+    reachable = scenario.max_speed * (1.0 if disc else math.sqrt(2.0))
+    limits = [min(budget_speed(scenario, rule), reachable) for rule in mode_rules]
+    if not disc and all(limit == reachable for limit in limits):
+        return None
+    return limits
 
 
 def feasible_velocity(action: Tensor, max_speed: float, norm_limit: Tensor | None) -> Tensor:

@@ -1,9 +1,37 @@
 """Who offloads and in which mode the helper works: the paper's equations 5, 8d, 8f and 11."""
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
 from hyuav.physics.energy import computation_energy
+
+
+class ModeRule(NamedTuple):
+    """Who chooses a helper's mode: flags, or one for each helper and flight, (..., H) bool."""
+
+    may_relay: Tensor | bool
+    """False where it always jams."""
+    must_relay: Tensor | bool
+    """True where it always relays."""
+
+    @classmethod
+    def of(cls, names: Sequence[str], device: torch.device | str | None = None) -> "ModeRule":
+        """The rules of these names, of :data:`MODE_RULES`: flags (len(names), 1)."""
+        flags = torch.tensor([_FLAGS[name] for name in names], device=device)
+        return cls(*flags.split(1, dim=-1))
+
+
+_FLAGS = {
+    "hybrid": ModeRule(may_relay=True, must_relay=False),
+    "relay": ModeRule(may_relay=True, must_relay=True),
+    "jamming": ModeRule(may_relay=False, must_relay=False),
+}
+
+MODE_RULES = tuple(_FLAGS)
+"""Who chooses the helpers' modes: the better of both in each slot, or always the same."""
 
 
 def covered_by_relay(
@@ -77,3 +105,18 @@ def admitted_by_edge(
 def prefers_relay(relay_sum_rate: Tensor, jamming_sum_rate: Tensor) -> Tensor:
     """The argmax of Algorithm 1: True (relay) only where C_1 > C_0, so that a tie jams."""
     return relay_sum_rate > jamming_sum_rate
+
+
+def chooses_relay(relay_sum_rate: Tensor, jamming_sum_rate: Tensor, rule: ModeRule) -> Tensor:
+    """The helpers' modes, True where they relay.
+
+    Args:
+        relay_sum_rate: C_1, (...) bps/Hz.
+        jamming_sum_rate: C_0, (...) bps/Hz.
+        rule: that decides.
+
+    Returns:
+        (..., H) bool.
+    """
+    better = prefers_relay(relay_sum_rate, jamming_sum_rate).unsqueeze(-1)
+    return (better | rule.must_relay) & rule.may_relay

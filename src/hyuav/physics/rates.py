@@ -6,20 +6,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-
-class ChannelGains(NamedTuple):
-    """Channel power gains of one slot; U is the number of UEs."""
-
-    ue_to_legitimate: Tensor
-    """g_{u,L}: (..., U)."""
-    ue_to_helper: Tensor
-    """g_{u,H}: (..., U)."""
-    ue_to_eavesdropper: Tensor
-    """g_{u,E}: (..., U)."""
-    helper_to_legitimate: Tensor
-    """g_{H,L}: (..., 1)."""
-    helper_to_eavesdropper: Tensor
-    """g_{H,E}: (..., 1)."""
+from hyuav.physics.channel import Links
 
 
 class AchievableRates(NamedTuple):
@@ -49,39 +36,42 @@ def spectral_efficiency(snr: Tensor) -> Tensor:
 
 
 def relay_rates(
-    gains: ChannelGains, ue_power: float, relay_power: float, noise_power: float
+    gains: Links, ue_power: float, relay_power: Tensor | float, noise_power: float
 ) -> AchievableRates:
     """Rates in relay mode: decode-and-forward in two halves of the UE's share of the slot.
 
     Args:
-        gains: of the slot.
+        gains: of the slot, with one helper and one eavesdropper.
         ue_power: p_u in W.
-        relay_power: p_R in W.
+        relay_power: p_R in W, (..., H) or of all.
         noise_power: sigma^2 in W.
     """
     ue_snr, relay_snr = ue_power / noise_power, relay_power / noise_power
-    combined = relay_snr * gains.helper_to_legitimate + ue_snr * gains.ue_to_legitimate
-    decoded = ue_snr * gains.ue_to_helper
-    overheard = relay_snr * gains.helper_to_eavesdropper + ue_snr * gains.ue_to_eavesdropper
+    combined = relay_snr * gains.helper_legitimate + ue_snr * gains.ue_legitimate
+    decoded = ue_snr * gains.ue_helper.squeeze(-1)
+    heard_from_helper = relay_snr * gains.helper_eavesdropper.squeeze(-1)
+    overheard = heard_from_helper + ue_snr * gains.ue_eavesdropper.squeeze(-1)
     return AchievableRates(torch.minimum(combined, decoded), overheard, 0.5)
 
 
 def jamming_rates(
-    gains: ChannelGains, ue_power: float, jamming_power: float, noise_power: float
+    gains: Links, ue_power: float, jamming_power: Tensor | float, noise_power: float
 ) -> AchievableRates:
     """Rates in jamming mode: the helper's noise reaches the eavesdropper and the legitimate UAV.
 
     Args:
-        gains: of the slot.
+        gains: of the slot, with one helper and one eavesdropper.
         ue_power: p_u in W.
-        jamming_power: p_J in W.
+        jamming_power: p_J in W, (..., H) or of all.
         noise_power: sigma^2 in W.
     """
     ue_snr, jamming_snr = ue_power / noise_power, jamming_power / noise_power
-    at_legitimate = ue_snr / (jamming_snr * gains.helper_to_legitimate + 1.0)
-    at_eavesdropper = ue_snr / (jamming_snr * gains.helper_to_eavesdropper + 1.0)
+    at_legitimate = ue_snr / (jamming_snr * gains.helper_legitimate + 1.0)
+    at_eavesdropper = ue_snr / (jamming_snr * gains.helper_eavesdropper.squeeze(-1) + 1.0)
     return AchievableRates(
-        at_legitimate * gains.ue_to_legitimate, at_eavesdropper * gains.ue_to_eavesdropper, 1.0
+        at_legitimate * gains.ue_legitimate,
+        at_eavesdropper * gains.ue_eavesdropper.squeeze(-1),
+        1.0,
     )
 
 

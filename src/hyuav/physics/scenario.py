@@ -1,7 +1,7 @@
 """What is fixed in an experiment: the node positions and the paper's parameter table."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.parameters import (
@@ -39,9 +39,25 @@ _power, _gain, _noise = number(0.0, 1e6), number(0.0, 1e6), number(1e-24, 1e6)
 _rate, _budget, _capacitance = number(0.0, 1e9), number(0.0, 1e30), number(0.0, 1.0)
 _range = increasing_pair(0.0, 1e12)
 _decibel = number(-100.0, 100.0)
+_exponent = number(0.0, 4.0)  # up to which float32 holds the gains over the longest distances
 _slots = count(1, 10**6)
 _point = sequence(number(), "two coordinates (x, y) in metres", length=2)
 _points = sequence(_point, "at least one pair of coordinates (x, y) in metres")
+
+
+def _one_node(name: str, value: Any) -> tuple[Point, ...]:
+    """Accept the position of one node, also as a plain pair of coordinates."""
+    items = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(items, list | tuple) and items and all(map(_is_scalar, items)):
+        items = [items]
+    positions: tuple[Point, ...] = _points(name, items)
+    if len(positions) > 1:
+        raise InputError(rejection(name, value, "the position (x, y) of one node"))
+    return positions
+
+
+def _is_scalar(value: Any) -> bool:
+    return hasattr(value, "__float__") and not getattr(value, "ndim", 0)
 
 
 @dataclass(frozen=True)
@@ -64,8 +80,12 @@ class Scenario(Parameters):
 
     ue_positions: tuple[Point, ...] = parameter(_points, symbol="(x_u, y_u)", unit="m")
     legitimate_position: Point = parameter(_point, (0.0, 0.0), symbol="(x_L, y_L)", unit="m")
-    eavesdropper_position: Point = parameter(_point, (80.0, 80.0), symbol="(x_E, y_E)", unit="m")
-    helper_start: Point = parameter(_point, (-60.0, -60.0), symbol="(x_H(0), y_H(0))", unit="m")
+    eavesdropper_positions: tuple[Point, ...] = parameter(
+        _one_node, ((80.0, 80.0),), symbol="(x_E, y_E)", unit="m"
+    )
+    helper_starts: tuple[Point, ...] = parameter(
+        _one_node, ((-60.0, -60.0),), symbol="(x_H(0), y_H(0))", unit="m"
+    )
     num_slots: int = parameter(_slots, 20, symbol="T")
     slot_duration: float = parameter(_flown, 1.0, symbol="Delta", unit="s")
     map_side: float = parameter(_length, 200.0, symbol="l_max", unit="m")
@@ -81,6 +101,7 @@ class Scenario(Parameters):
     relay_power: float = parameter(_power, 0.012, symbol="p_R", unit="W")
     noise_power: float = parameter(_noise, 1e-13, symbol="sigma^2", unit="W")
     ground_to_air_gain: float = parameter(_gain, 1e-5, symbol="beta_0")
+    ground_to_air_exponent: float = parameter(_exponent, 2.0, symbol="alpha")
     air_to_air_gain: float = parameter(_gain, 1e-4, symbol="beta_1")
     ground_to_air_k_factor: float = parameter(_decibel, 12.0, symbol="K^G2A", unit="dB")
     air_to_air_k_factor: float = parameter(_decibel, 20.0, symbol="K^A2A", unit="dB")
@@ -97,10 +118,10 @@ class Scenario(Parameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("legitimate_position", "eavesdropper_position", "helper_start"):
-            self._require_on_map(name, getattr(self, name))
-        for index, position in enumerate(self.ue_positions):
-            self._require_on_map(f"ue_positions[{index}]", position)
+        self._require_on_map("legitimate_position", self.legitimate_position)
+        for name in ("eavesdropper_positions", "helper_starts", "ue_positions"):
+            for index, position in enumerate(getattr(self, name)):
+                self._require_on_map(f"{name}[{index}]", position)
         self._require_finite_load()
 
     def _require_on_map(self, name: str, position: Point) -> None:
@@ -121,6 +142,16 @@ class Scenario(Parameters):
     def num_ues(self) -> int:
         """U, the number of UEs."""
         return len(self.ue_positions)
+
+    @property
+    def num_helpers(self) -> int:
+        """H, the number of helpers."""
+        return len(self.helper_starts)
+
+    @property
+    def num_eavesdroppers(self) -> int:
+        """E, the number of eavesdroppers."""
+        return len(self.eavesdropper_positions)
 
     @classmethod
     def preset(cls, name: str) -> Self:

@@ -1,33 +1,28 @@
-"""A scenario bound to the equations: what one slot brings, for any batch of helper positions."""
+"""The equations applied in order: what one slot brings, for any batch of flights."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from hyuav.physics import channel, energy, offloading
-from hyuav.physics import motion as flight
-from hyuav.physics import rates as secrecy
+from hyuav.physics import channel, energy, motion, offloading, rates
+from hyuav.physics.channel import LinkRow, Links
+from hyuav.physics.layout import Nodes
+from hyuav.physics.offloading import ModeRule
 from hyuav.physics.scenario import Scenario
-
-SCHEMES = ("hybrid", "relay", "jamming")
-"""Who chooses the helper's mode: the better of both in each slot, or always the same."""
+from hyuav.physics.tasks import Tasks
 
 
-class Tasks(NamedTuple):
-    """The UEs' tasks of one slot."""
+class Control(NamedTuple):
+    """What the helpers do in a slot."""
 
-    size: Tensor
-    """S_u: (..., U) bit."""
-    cycles_per_bit: Tensor
-    """F_u: (..., U) cycle/bit."""
-
-    @property
-    def cpu_cycles(self) -> Tensor:
-        """S_u F_u: (..., U) cycles."""
-        return self.size * self.cycles_per_bit
+    velocity: Tensor
+    """(..., H, 2) m/s, within the limits that :meth:`Physics.velocity` keeps."""
+    mode_rule: ModeRule = ModeRule(may_relay=True, must_relay=False)
+    """Who chooses their modes; by default the better of both is taken."""
+    power: Tensor | float = 1.0
+    """(..., H), what they send at, in units of the nominal power of their mode."""
 
 
 class ModeOutcome(NamedTuple):
@@ -41,15 +36,76 @@ class ModeOutcome(NamedTuple):
     """z_u: (..., U) bool."""
 
 
-class SecureOffloadingSystem:
-    """The scenario's constants on a device, and the equations applied to them.
+class SlotOutcome(NamedTuple):
+    """What a slot brings: where it leads, in both modes and in the chosen one."""
 
-    Every method takes helper positions with any leading batch shape, written ``...``.
+    nodes: Nodes
+    """Where all nodes are in this slot."""
+    control: Control
+    """What the helpers did; the map's edge may have turned one back."""
+    off_map: Tensor
+    """(..., H) bool, the flight would have left the map and ended where it began."""
+    distances: Tensor
+    """(..., H, U + 1 + E) m, horizontal: from each helper to the UEs, L and the eavesdroppers."""
+    relays: Tensor
+    """(..., H) bool, which helpers relay; the others jam."""
+    relay: ModeOutcome
+    jamming: ModeOutcome
+
+    @property
+    def sum_rate(self) -> Tensor:
+        """The secrecy sum-rate in the chosen mode: (..., 1) bps/Hz."""
+        return torch.where(
+            self.relays, self.relay.sum_rate.unsqueeze(-1), self.jamming.sum_rate.unsqueeze(-1)
+        )
+
+    @property
+    def offloading(self) -> Tensor:
+        """z_u in the chosen mode: (..., U) bool."""
+        return torch.where(self.relays, self.relay.offloading, self.jamming.offloading)
+
+    @property
+    def secrecy_rate(self) -> Tensor:
+        """[R^d_u - R^e_u]^+ in the chosen mode: (..., U) bps/Hz."""
+        return torch.where(self.relays, self.relay.secrecy_rate, self.jamming.secrecy_rate)
+
+
+class StandingNodes(NamedTuple):
+    """What follows from the nodes that do not move: UEs, L and eavesdroppers."""
+
+    positions: Tensor
+    """(..., 1, U + 1 + E, 2) m, beside the helpers' axis."""
+    ue_to_legitimate: Tensor
+    """Distances, (..., U) m."""
+    legitimate_gain: Tensor
+    """Path gains of the UEs' links to L, (..., U)."""
+    eavesdropper_gain: Tensor
+    """And to the eavesdroppers, (..., U, E)."""
+    may_offload: Tensor
+    """(..., U) bool: whom L covers and who can pay for sending while the helper jams."""
+
+
+class Geometry(NamedTuple):
+    """What follows from where all nodes are, before any fading."""
+
+    distances: Tensor
+    """(..., H, U + 1 + E) m, as in :class:`SlotOutcome`."""
+    ue_to_helper: Tensor
+    """Distances, (..., U, H) m."""
+    standing: StandingNodes
+    gains: Links
+    """Path gains."""
+
+
+class Physics:
+    """The scenario's constants on a device.
 
     Args:
         scenario: node positions and parameters.
         device: of all tensors.
         dtype: float32 or float64.
+        nodes: where the nodes are before the first slot, where that is not the scenario's layout
+            alone; of the scenario's counts.
     """
 
     def __init__(
@@ -57,198 +113,160 @@ class SecureOffloadingSystem:
         scenario: Scenario,
         device: torch.device | str | None = None,
         dtype: torch.dtype = torch.float32,
+        nodes: Nodes | None = None,
     ) -> None:
         self.scenario = scenario
         self.device = torch.device(device) if device is not None else torch.device("cpu")
         self.dtype = dtype
-        self.ue_positions = self._tensor(scenario.ue_positions)
-        self.nodes = self._tensor(
-            (
-                *scenario.ue_positions,
-                scenario.legitimate_position,
-                scenario.eavesdropper_position,
-            )
-        )
-        self.helper_start = self._tensor(scenario.helper_start)
-        ue_to_legitimate, ue_to_eavesdropper = (
-            channel.horizontal_distance(self.ue_positions, self._tensor(position))
-            for position in (scenario.legitimate_position, scenario.eavesdropper_position)
-        )
-        self._ue_to_legitimate = ue_to_legitimate
-        self._path_to_legitimate = channel.path_gain(
-            ue_to_legitimate, scenario.altitude, scenario.ground_to_air_gain
-        )
-        self._path_to_eavesdropper = channel.path_gain(
-            ue_to_eavesdropper, scenario.eavesdropper_altitude, scenario.ground_to_air_gain
-        )
-        ground = channel.k_factor_from_db(scenario.ground_to_air_k_factor)
-        air = channel.k_factor_from_db(scenario.air_to_air_k_factor)
-        self._k_factor = self._tensor([ground] * (3 * scenario.num_ues) + [air] * 2)
-        self.fading_law = channel.RicianFading.of(self._k_factor)
-        jamming_coverage = offloading.covered_by_legitimate(
-            ue_to_legitimate, scenario.coverage_radius
-        )
-        self._allowed_to_jam = jamming_coverage & self._ue_can_pay(relay=False)
-        self.edge_can_saturate = self._largest_load_exceeds_budget()
+        self.nodes = Nodes.of(scenario, self.device, dtype) if nodes is None else nodes
+        self.link_row = LinkRow.of(scenario)
+        self.k_factor = self._k_factor()
+        """Of all links, (link_row.size,), as power ratios."""
+        self._pays_for_relaying = energy.ue_can_pay(scenario, relay=True)
+        self.edge_can_saturate = energy.edge_can_saturate(scenario)
         """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
+        self._standing = self._stand(self.nodes)
 
     def _tensor(self, values: object) -> Tensor:
         return torch.tensor(values, dtype=self.dtype, device=self.device)
 
-    def _ue_can_pay(self, *, relay: bool) -> bool:
-        """Eq. 8e for a UE that offloads: the same for every UE, slot and position."""
-        scenario = self.scenario
-        spent = energy.offloading_energy(
-            scenario.ue_power, scenario.slot_duration, scenario.num_ues, relay=relay
+    def _k_factor(self) -> Tensor:
+        ground = channel.k_factor_from_db(self.scenario.ground_to_air_k_factor)
+        air = channel.k_factor_from_db(self.scenario.air_to_air_k_factor)
+        factors = zip((ground, ground, ground, air, air), self.link_row.shapes, strict=True)
+        links = Links(*(self._tensor(factor).expand(shape) for factor, shape in factors))
+        return self.link_row.flatten(links)
+
+    def _stand(self, nodes: Nodes) -> StandingNodes:
+        scenario, ues = self.scenario, nodes.ue
+        legitimate = nodes.legitimate.unsqueeze(-2)
+        to_legitimate = channel.horizontal_distance(ues, legitimate)
+        to_eavesdroppers = channel.horizontal_distance(
+            ues.unsqueeze(-2), nodes.eavesdropper.unsqueeze(-3)
         )
-        return spent <= scenario.ue_energy_budget
-
-    def _largest_load_exceeds_budget(self) -> bool:
-        scenario = self.scenario
-        frequency = (
-            scenario.num_ues * scenario.task_size[1] * scenario.cycles_per_bit[1]
-        ) / scenario.slot_duration
-        spent = energy.computation_energy(
-            torch.tensor(frequency, dtype=torch.float64, device=self.device),
-            scenario.capacitance,
-            scenario.slot_duration,
-        )
-        return bool(spent > scenario.edge_energy_budget)
-
-    def budget_speed(self, scheme: str) -> float:
-        """The speed in m/s at which flying and transmitting spend E_H in one slot (eq. 8g).
-
-        The mode is chosen after the move, so the dearer transmission open to ``scheme`` is
-        set aside: jamming through the slot, or relaying for every UE.
-        """
-        scenario = self.scenario
-        relaying = scenario.relay_power * scenario.slot_duration / 2
-        jamming = energy.jamming_energy(scenario.jamming_power, scenario.slot_duration)
-        transmission = {"relay": relaying, "jamming": jamming, "hybrid": max(relaying, jamming)}
-        return energy.speed_within_budget(
-            scenario.helper_energy_budget - transmission[scheme],
-            scenario.helper_mass,
-            scenario.slot_duration,
+        covered = offloading.covered_by_legitimate(to_legitimate, scenario.coverage_radius)
+        positions = ues, legitimate, nodes.eavesdropper
+        leading = torch.broadcast_shapes(*(each.shape[:-2] for each in positions))
+        positions = [each.expand(*leading, *each.shape[-2:]) for each in positions]
+        return StandingNodes(
+            torch.cat(positions, dim=-2).unsqueeze(-3),
+            to_legitimate,
+            channel.ground_to_air(scenario, to_legitimate, scenario.altitude),
+            channel.ground_to_air(scenario, to_eavesdroppers, scenario.eavesdropper_altitude),
+            covered & energy.ue_can_pay(scenario, relay=False),
         )
 
-    def norm_limit(self, schemes: Sequence[str]) -> Tensor | None:
-        """The bound on the norm of the velocity, from the speed limit and the budget E_H.
+    def standing(self, nodes: Nodes) -> StandingNodes:
+        """What follows from the nodes that do not move; of the own layout it is known already."""
+        own = self.nodes
+        if (
+            nodes.ue is own.ue
+            and nodes.legitimate is own.legitimate
+            and nodes.eavesdropper is own.eavesdropper
+        ):
+            return self._standing
+        return self._stand(nodes)
 
-        Args:
-            schemes: one name of :data:`SCHEMES` for each row.
+    def distances(self, nodes: Nodes) -> Tensor:
+        """From each helper to the UEs, to L and to the eavesdroppers: (..., H, U + 1 + E) m."""
+        others = self.standing(nodes).positions
+        return channel.horizontal_distance(nodes.helper.unsqueeze(-2), others)
 
-        Returns:
-            (len(schemes), 1) m/s, or None where bounding each component by v_max suffices.
+    def by_role(self, distances: Tensor) -> tuple[Tensor, ...]:
+        """The parts of :meth:`distances`: to the UEs (..., U), to L (..., 1), the rest (..., E)."""
+        return distances.split((self.scenario.num_ues, 1, self.scenario.num_eavesdroppers), dim=-1)
+
+    def geometry(self, nodes: Nodes) -> Geometry:
+        """Distances and path gains (eq. 3 and 4 without fading) of all links."""
+        scenario, standing = self.scenario, self.standing(nodes)
+        distances = self.distances(nodes)
+        to_ues, to_legitimate, to_eavesdroppers = self.by_role(distances)
+        ue_to_helper = to_ues.mT
+        climb = scenario.altitude - scenario.eavesdropper_altitude
+        gains = Links(
+            standing.legitimate_gain,
+            channel.ground_to_air(scenario, ue_to_helper, scenario.altitude),
+            standing.eavesdropper_gain,
+            channel.air_to_air(scenario, to_legitimate.squeeze(-1), 0.0),
+            channel.air_to_air(scenario, to_eavesdroppers, climb),
+        )
+        return Geometry(distances, ue_to_helper, standing, gains)
+
+    def norm_limit(self, mode_rules: Sequence[str]) -> Tensor | None:
+        """The bounds that :func:`hyuav.physics.motion.norm_limits` gives: (len(mode_rules), 1)."""
+        limits = motion.norm_limits(self.scenario, mode_rules)
+        return None if limits is None else self._tensor(limits).unsqueeze(-1)
+
+    def velocity(self, action: Tensor, norm_limit: Tensor | None) -> Tensor:
+        """The velocity (..., 2) m/s of an action (..., 2) in units of v_max, within the limits.
+
+        ``norm_limit`` is what :meth:`norm_limit` gives, broadcast against the actions.
         """
+        return motion.feasible_velocity(action, self.scenario.max_speed, norm_limit)
+
+    def move(self, position: Tensor, velocity: Tensor) -> motion.Move:
+        """Fly one slot from ``position`` (..., 2) m at ``velocity`` (..., 2) m/s."""
         scenario = self.scenario
-        disc = scenario.speed_limit == "disc"
-        reachable = scenario.max_speed * (1.0 if disc else math.sqrt(2.0))
-        limits = [min(self.budget_speed(scheme), reachable) for scheme in schemes]
-        if not disc and all(limit == reachable for limit in limits):
-            return None
-        return self._tensor(limits).unsqueeze(-1)
-
-    def move(self, position: Tensor, action: Tensor, norm_limit: Tensor | None) -> flight.Move:
-        """Fly one slot from ``position`` (..., 2) m by ``action`` (..., 2) in units of v_max.
-
-        ``norm_limit`` is what :meth:`norm_limit` gives, broadcast against the positions.
-        """
-        scenario = self.scenario
-        velocity = flight.feasible_velocity(action, scenario.max_speed, norm_limit)
-        return flight.move(position, velocity, scenario.slot_duration, scenario.map_side)
-
-    def distances(self, position: Tensor) -> Tensor:
-        """Horizontal distances from the helper to the UEs in order, L and E: (..., U + 2) m."""
-        return channel.horizontal_distance(position.unsqueeze(-2), self.nodes)
+        return motion.move(position, velocity, scenario.slot_duration, scenario.map_side)
 
     def draw_fading(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor | None:
-        """One slot's fading powers: (*shape, 3 U + 2), or None where fading is off.
+        """One slot's fading powers in rows (*shape, size), as :class:`LinkRow` has them.
 
-        In order: the U links to L, the U links to H, the U links to E, then H-L and H-E.
+        None where fading is off.
         """
         if not self.scenario.fading:
             return None
-        return channel.rician_power(self._k_factor, (*shape, self._k_factor.shape[-1]), generator)
-
-    def draw_tasks(self, shape: tuple[int, ...], generator: torch.Generator) -> Tasks:
-        """One slot's tasks, uniform over the parameter ranges."""
-        size, cycles_per_bit = torch.rand(
-            (2, *shape, self.scenario.num_ues),
-            generator=generator,
-            dtype=self.dtype,
-            device=self.device,
-        )
-        return self.tasks_of(size, cycles_per_bit)
-
-    def tasks_of(self, size: Tensor, cycles_per_bit: Tensor) -> Tasks:
-        """The tasks at levels (..., U) of their ranges: 0 the smallest, 1 the largest."""
-        ranges = (self.scenario.task_size, self.scenario.cycles_per_bit)
-        return Tasks(
-            *(
-                low + (high - low) * level
-                for (low, high), level in zip(ranges, (size, cycles_per_bit), strict=True)
-            )
-        )
-
-    def mean_tasks(self, shape: tuple[int, ...]) -> Tasks:
-        """Tasks of mean size and mean cycles per bit, for pictures that draw none."""
-        ranges = (self.scenario.task_size, self.scenario.cycles_per_bit)
-        full = (*shape, self.scenario.num_ues)
-        return Tasks(*(self._tensor(sum(bounds) / 2).expand(full) for bounds in ranges))
-
-    def channel_gains(self, distances: Tensor, fading: Tensor | None) -> secrecy.ChannelGains:
-        """Eq. 3 and 4 for every link.
-
-        Args:
-            distances: (..., U + 2) m from :meth:`distances`.
-            fading: (..., 3 U + 2) from :meth:`draw_fading`.
-        """
-        scenario = self.scenario
-        num_ues = scenario.num_ues
-        to_ues, to_legitimate, to_eavesdropper = distances.split((num_ues, 1, 1), dim=-1)
-        climb = scenario.altitude - scenario.eavesdropper_altitude
-        gains = secrecy.ChannelGains(
-            self._path_to_legitimate,
-            channel.path_gain(to_ues, scenario.altitude, scenario.ground_to_air_gain),
-            self._path_to_eavesdropper,
-            channel.path_gain(to_legitimate, 0.0, scenario.air_to_air_gain),
-            channel.path_gain(to_eavesdropper, climb, scenario.air_to_air_gain),
-        )
-        if fading is None:
-            return gains
-        powers = fading.split((num_ues, num_ues, num_ues, 1, 1), dim=-1)
-        return secrecy.ChannelGains(
-            *(gain * power for gain, power in zip(gains, powers, strict=True))
-        )
+        return channel.rician_power(self.k_factor, (*shape, self.link_row.size), generator)
 
     def relay_outcome(
-        self, distances: Tensor, gains: secrecy.ChannelGains, tasks: Tasks | None
+        self,
+        geometry: Geometry,
+        gains: Links,
+        tasks: Tasks | None,
+        power: Tensor | float = 1.0,
     ) -> ModeOutcome:
-        """The slot in relay mode; ``tasks`` is needed where :attr:`edge_can_saturate`."""
+        """The slot in relay mode.
+
+        Args:
+            geometry: of the slot's nodes.
+            gains: with fading.
+            tasks: needed where :attr:`edge_can_saturate`, and used nowhere else.
+            power: as in :class:`Control`.
+        """
         scenario = self.scenario
-        rates = secrecy.relay_rates(
-            gains, scenario.ue_power, scenario.relay_power, scenario.noise_power
+        achievable = rates.relay_rates(
+            gains, scenario.ue_power, scenario.relay_power * power, scenario.noise_power
         )
         covered = offloading.covered_by_relay(
-            distances[..., : scenario.num_ues], self._ue_to_legitimate, scenario.coverage_radius
+            geometry.ue_to_helper.squeeze(-1),
+            geometry.standing.ue_to_legitimate,
+            scenario.coverage_radius,
         )
-        return self._outcome(rates, covered & self._ue_can_pay(relay=True), tasks)
+        return self._outcome(achievable, covered & self._pays_for_relaying, tasks)
 
-    def jamming_outcome(self, gains: secrecy.ChannelGains, tasks: Tasks | None) -> ModeOutcome:
-        """The slot in jamming mode; ``tasks`` is needed where :attr:`edge_can_saturate`."""
+    def jamming_outcome(
+        self,
+        geometry: Geometry,
+        gains: Links,
+        tasks: Tasks | None,
+        power: Tensor | float = 1.0,
+    ) -> ModeOutcome:
+        """The slot in jamming mode; as :meth:`relay_outcome`."""
         scenario = self.scenario
-        rates = secrecy.jamming_rates(
-            gains, scenario.ue_power, scenario.jamming_power, scenario.noise_power
+        achievable = rates.jamming_rates(
+            gains, scenario.ue_power, scenario.jamming_power * power, scenario.noise_power
         )
-        return self._outcome(rates, self._allowed_to_jam, tasks)
+        return self._outcome(achievable, geometry.standing.may_offload, tasks)
 
     def _outcome(
-        self, rates: secrecy.AchievableRates, allowed: Tensor, tasks: Tasks | None
+        self, achievable: rates.AchievableRates, allowed: Tensor, tasks: Tasks | None
     ) -> ModeOutcome:
         scenario = self.scenario
-        rate = secrecy.secrecy_rate(rates)
+        rate = rates.secrecy_rate(achievable)
         decision = offloading.offloading_decision(rate, allowed, scenario.min_secrecy_rate)
-        if tasks is not None:
+        if self.edge_can_saturate:
+            if tasks is None:
+                raise ValueError("tasks: expected, because they can fill the edge server")
             decision = offloading.admitted_by_edge(
                 decision,
                 rate,
@@ -257,28 +275,42 @@ class SecureOffloadingSystem:
                 scenario.slot_duration,
                 scenario.edge_energy_budget,
             )
-        return ModeOutcome(secrecy.secrecy_sum_rate(rate, decision), rate, decision)
+        return ModeOutcome(rates.secrecy_sum_rate(rate, decision), rate, decision)
 
-    def sum_rates(
-        self, position: Tensor, fading: Tensor | None = None, tasks: Tasks | None = None
-    ) -> tuple[Tensor, Tensor]:
-        """C_1 (relay) and C_0 (jamming) at helper positions.
 
-        Args:
-            position: (..., 2) m.
-            fading: (..., 3 U + 2) broadcast against the positions; None for no fading.
-            tasks: of shape (..., U); None where the edge server is never full.
+def slot(
+    physics: Physics,
+    nodes: Nodes,
+    control: Control,
+    fading: Links | None = None,
+    tasks: Tasks | None = None,
+) -> SlotOutcome:
+    """One slot of any batch of flights: lines 6 to 11 of Algorithm 1.
 
-        Returns:
-            two tensors (...) in bps/Hz.
+    The helpers fly, then the channel is known: who offloads, and what it brings, in both modes
+    (eq. 3 to 6, 8c to 8f and 11), and the mode that is chosen.
 
-        Raises:
-            ValueError: no tasks are given though they can fill the edge server.
-        """
-        if tasks is None and self.edge_can_saturate:
-            raise ValueError("tasks: expected, because they can fill the edge server")
-        distances = self.distances(position)
-        gains = self.channel_gains(distances, fading)
-        relay = self.relay_outcome(distances, gains, tasks)
-        jamming = self.jamming_outcome(gains, tasks)
-        return torch.broadcast_tensors(relay.sum_rate, jamming.sum_rate)
+    Args:
+        physics: the scenario's constants.
+        nodes: where all are before the slot, such as :attr:`Physics.nodes`.
+        control: what the helpers do.
+        fading: powers of all links; None for no fading.
+        tasks: of the UEs; needed where :attr:`Physics.edge_can_saturate`.
+
+    Raises:
+        ValueError: no tasks are given though they can fill the edge server.
+
+    Example:
+        >>> physics = Physics(Scenario.preset("two_clusters"))
+        >>> northeast = Control(torch.full((1, 2), 20.0))
+        >>> slot(physics, physics.nodes, northeast).nodes.helper
+        tensor([[-40., -40.]])
+    """
+    moved = physics.move(nodes.helper, control.velocity)
+    nodes = nodes._replace(helper=moved.position)
+    geometry = physics.geometry(nodes)
+    gains = geometry.gains.faded(fading)
+    relay = physics.relay_outcome(geometry, gains, tasks, control.power)
+    jamming = physics.jamming_outcome(geometry, gains, tasks, control.power)
+    relays = offloading.chooses_relay(relay.sum_rate, jamming.sum_rate, control.mode_rule)
+    return SlotOutcome(nodes, control, moved.off_map, geometry.distances, relays, relay, jamming)

@@ -46,7 +46,7 @@ def grid_over_map(scenario: Scenario, resolution: float) -> Grid:
     """
     half = scenario.map_side / 2
     axes, origin = [], []
-    for coordinate in scenario.helper_start:
+    for coordinate in scenario.helper_starts[0]:
         before = int((half + coordinate) / resolution * (1 + ROUNDING))
         after = int((half - coordinate) / resolution * (1 + ROUNDING))
         axis = coordinate + resolution * np.arange(-before, after + 1)
@@ -133,7 +133,7 @@ def values_to_go(reward: Values, reach: Reach, num_slots: int) -> list[Values]:
 def best_flight(
     reward: Values, values: list[Values], reach: Reach, grid: Grid, num_slots: int
 ) -> Tensor:
-    """The best flight of ``num_slots`` slots from the start: (num_slots + 1, 2) m, float64.
+    """The best flight of ``num_slots`` slots from the start: (num_slots + 1, 1, 2) m, float64.
 
     Args:
         reward: (X, Y) bps/Hz.
@@ -146,4 +146,4 @@ def best_flight(
     for value in reversed(values[:num_slots]):
         flight.append(reach.argbest(reward + value, flight[-1]))
     rows, columns = np.array(flight).T
-    return torch.from_numpy(np.stack([grid.x[rows], grid.y[columns]], axis=-1))
+    return torch.from_numpy(np.stack([grid.x[rows], grid.y[columns]], axis=-1)).unsqueeze(-2)

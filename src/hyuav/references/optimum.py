@@ -1,4 +1,4 @@
-"""The best possible flight of each scheme, by dynamic programming over the helper's position.
+"""The best possible flight under each mode rule, by dynamic programming over the helper's position.
 
 Given the position, fading and tasks are independent from slot to slot and unknown when the
 action is taken. The best expected return is therefore a deterministic dynamic program over the
@@ -24,8 +24,9 @@ from torch import Tensor
 from hyuav._support.errors import InputError, InputTypeError, rejection
 from hyuav._support.parameters import choice, count, one_or_more
 from hyuav.envs.arguments import as_scenario, as_seed
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SCHEMES, SecureOffloadingSystem
+from hyuav.physics.slot import Physics
 from hyuav.references.grid import Grid, Reach, best_flight, grid_over_map, values_to_go
 from hyuav.references.rewards import estimate_return, reward_maps
 
@@ -36,16 +37,16 @@ MEMORY_LIMIT = 4 * 2**30
 """Bytes that the value tables may take."""
 
 
-_schemes = one_or_more(choice(*SCHEMES), f"a list of {', '.join(SCHEMES)}")
+_mode_rules = one_or_more(choice(*MODE_RULES), f"a list of {', '.join(MODE_RULES)}")
 
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """The best flight of one scheme over one horizon."""
+    """The best flight under one mode rule over one horizon."""
 
     scenario: Scenario
     """What is flown; its ``num_slots`` is the horizon T of this flight."""
-    scheme: str
+    mode_rule: str
     """Who chooses the helper's mode."""
     resolution: float
     """Spacing of the grid in metres."""
@@ -54,24 +55,28 @@ class Optimum:
     standard_error: float
     """Of ``value`` in bps/Hz; 0 where no slot is random."""
     path: Tensor
-    """(T + 1, 2) m, float64: where the helper is before the first slot and in each slot."""
+    """(T + 1, H, 2) m, float64: where the helpers are before the first slot and in each slot."""
     modes: Tensor
-    """(T,) int64: 1 relay, 0 jamming. Of the hybrid, relay where expected C_1 exceeds C_0."""
+    """(T, H) int64: 1 relay, 0 jamming. Of the hybrid, relay where expected C_1 exceeds C_0."""
+    power: Tensor
+    """(T, H) W, float64: the nominal power of the mode."""
+    upper_bound: float | None = None
+    """Of what any flight earns, in bps/Hz; None where none is computed."""
 
 
 class FlightPolicy(TensorDictModuleBase):
     """Fly a given path in an environment made by :func:`hyuav.make_env`.
 
-    Reads ``position`` (..., 2) m and ``step_count`` (..., 1), writes ``action`` (..., 2): the
-    velocity, in units of v_max, that leads to the path's next position. The helper stays at the
-    last position when the path is flown.
+    Reads ``position`` (..., H, 2) m and ``step_count`` (..., 1), writes ``action`` (..., 2 H): the
+    velocities, in units of v_max, that lead to the path's next positions. The helpers stay at the
+    last ones when the path is flown.
 
     Args:
-        path: (T + 1, 2) m, such as :attr:`Optimum.path`.
+        path: (T + 1, H, 2) m, such as :attr:`Optimum.path`.
         scenario: whose speed and slot duration the environment has.
 
     Example:
-        >>> optimum = solve("two_clusters", ["hybrid"])["hybrid"]
+        >>> optimum = solve_optimum("two_clusters", ["hybrid"])["hybrid"]
         >>> env = make_env(optimum.scenario, "hybrid", batch_size=(100,))
         >>> env.rollout(20, FlightPolicy(optimum.path, optimum.scenario))
     """
@@ -89,13 +94,13 @@ class FlightPolicy(TensorDictModuleBase):
         path = self.get_buffer("path")
         slot = (tensordict["step_count"].squeeze(-1) + 1).clamp(max=len(path) - 1)
         position = tensordict["position"]
-        action = (path[slot] - position) / self.step_length
+        action = ((path[slot] - position) / self.step_length).flatten(-2)
         return tensordict.set("action", action.clamp(-1.0, 1.0).to(position.dtype))
 
 
-def solve(
+def solve_optimum(
     scenario: Scenario | str,
-    schemes: Sequence[str] = SCHEMES,
+    mode_rules: Sequence[str] = MODE_RULES,
     *,
     resolution: float = RESOLUTION,
     draws: int = 256,
@@ -103,23 +108,23 @@ def solve(
     seed: int = 0,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
 ) -> dict[str, Optimum]:
-    """The best flight of each scheme over the scenario's T slots.
+    """The best flight under each mode rule over the scenario's T slots.
 
     Args:
         scenario: node positions and parameters, or the name of a preset.
-        schemes: the schemes wanted, of :data:`hyuav.physics.slot.SCHEMES`.
+        mode_rules: who may choose the modes, of :data:`hyuav.physics.offloading.MODE_RULES`.
         resolution: spacing of the grid in m; the helper's start is a grid point.
         draws: of a slot's fading and tasks that the expected reward is averaged over, the same
             at all positions. They choose the flight and nothing else.
         evaluation_draws: of whole episodes, from which the flight's value is estimated.
         seed: of all draws; not used where no slot is random.
-        track: passes on the schemes one by one, as what shows the progress does.
+        track: passes on the mode rules one by one, as what shows the progress does.
 
     Returns:
-        an :class:`Optimum` for each scheme.
+        an :class:`Optimum` for each mode rule.
 
     Raises:
-        InputError: (a ``ValueError``) an unknown preset or scheme, a resolution that is not
+        InputError: (a ``ValueError``) an unknown preset or mode rule, a resolution that is not
             above 0 or needs more than :data:`MEMORY_LIMIT`, fewer than two draws.
         InputTypeError: (also a ``TypeError``) an argument of the wrong type.
     """
@@ -127,20 +132,20 @@ def solve(
     found = solve_horizons(
         scenario,
         (scenario.num_slots,),
-        schemes,
+        mode_rules,
         resolution=resolution,
         draws=draws,
         evaluation_draws=evaluation_draws,
         seed=seed,
         track=track,
     )
-    return {scheme: optima[scenario.num_slots] for scheme, optima in found.items()}
+    return {mode_rule: optima[scenario.num_slots] for mode_rule, optima in found.items()}
 
 
 def solve_horizons(
     scenario: Scenario | str,
     horizons: Sequence[int],
-    schemes: Sequence[str] = SCHEMES,
+    mode_rules: Sequence[str] = MODE_RULES,
     *,
     resolution: float = RESOLUTION,
     draws: int = 256,
@@ -148,27 +153,27 @@ def solve_horizons(
     seed: int = 0,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
 ) -> dict[str, dict[int, Optimum]]:
-    """The best flight of each scheme over each horizon, from one backward pass.
+    """The best flight under each mode rule over each horizon, from one backward pass.
 
     Args:
-        scenario: as for :func:`solve`, like all that follows ``horizons``; its ``num_slots`` is
-            not used.
+        scenario: as for :func:`solve_optimum`, like all that follows ``horizons``; its
+            ``num_slots`` is not used.
         horizons: numbers of slots T, each at least 1.
-        schemes: the schemes wanted.
+        mode_rules: who may choose the modes.
         resolution: spacing of the grid in m.
         draws: that the expected reward is averaged over.
         evaluation_draws: from which each flight's value is estimated.
         seed: of all draws.
-        track: passes on the schemes.
+        track: passes on the mode rules.
 
     Returns:
-        by scheme and horizon.
+        by mode rule and horizon.
 
     Raises:
-        InputError: as :func:`solve`, and for horizons that are none or below 1.
+        InputError: as :func:`solve_optimum`, and for horizons that are none or below 1.
     """
     scenario = as_scenario(scenario)
-    schemes = _schemes("schemes", schemes)
+    mode_rules = _mode_rules("mode_rules", mode_rules)
     scenarios = _with_horizons(scenario, horizons)
     longest = max(scenarios)
     draws = count(2)("draws", draws)
@@ -177,22 +182,24 @@ def solve_horizons(
     root = torch.Generator().manual_seed(as_seed(seed))
     map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root).tolist()
 
-    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
+    physics = Physics(scenario, dtype=torch.float64)
     grid = grid_over_map(scenario, resolution)
-    maps = reward_maps(system, grid.positions(), draws, torch.Generator().manual_seed(map_seed))
+    maps = reward_maps(physics, grid.positions(), draws, torch.Generator().manual_seed(map_seed))
     optima: dict[str, dict[int, Optimum]] = {}
-    for scheme in track(schemes):
-        reward = maps[SCHEMES.index(scheme)].reshape(grid.shape).numpy()
-        reach = _reach(system, scheme, grid, resolution)
+    for mode_rule in track(mode_rules):
+        reward = maps[MODE_RULES.index(mode_rule)].reshape(grid.shape).numpy()
+        reach = _reach(physics, mode_rule, grid, resolution)
         values = values_to_go(reward, reach, longest)
-        optima[scheme] = {}
+        optima[mode_rule] = {}
         for horizon, shorter in scenarios.items():
-            path = _flyable(best_flight(reward, values, reach, grid, horizon), system, scheme)
+            path = _flyable(best_flight(reward, values, reach, grid, horizon), physics, mode_rule)
             # The same episodes for every flight, so that differences between them stand out.
             generator = torch.Generator().manual_seed(evaluation_seed)
-            value, error, modes = estimate_return(system, path, scheme, evaluation_draws, generator)
-            optima[scheme][horizon] = Optimum(
-                shorter, scheme, resolution, value, error, path, modes
+            value, error, modes = estimate_return(
+                physics, path, mode_rule, evaluation_draws, generator
+            )
+            optima[mode_rule][horizon] = Optimum(
+                shorter, mode_rule, resolution, value, error, path, modes, _power(scenario, modes)
             )
     return optima
 
@@ -220,36 +227,42 @@ def require_resolution(resolution: float, map_side: float, num_slots: int) -> No
         raise InputError(rejection("resolution", resolution, reason))
 
 
-def _reach(system: SecureOffloadingSystem, scheme: str, grid: Grid, resolution: float) -> Reach:
-    scenario = system.scenario
+def _reach(physics: Physics, mode_rule: str, grid: Grid, resolution: float) -> Reach:
+    scenario = physics.scenario
     spacings = scenario.slot_duration / resolution
-    norm_limit = system.norm_limit([scheme])
+    norm_limit = physics.norm_limit([mode_rule])
     disc = math.inf if norm_limit is None else float(norm_limit) * spacings
     return Reach(min(scenario.max_speed * spacings, max(grid.shape)), disc)
 
 
-def _flyable(path: Tensor, system: SecureOffloadingSystem, scheme: str) -> Tensor:
-    """Draw a path (T + 1, 2) m back from the edges that float32 would put it beyond.
+def _flyable(path: Tensor, physics: Physics, mode_rule: str) -> Tensor:
+    """Draw a path (T + 1, H, 2) m back from the edges that float32 would put it beyond.
 
     The best positions often lie exactly on the edge of a UE's coverage or of the map, and an
     environment in float32 may miss the edge by a few units in the last place: the reward of a
     slot would be lost. Such positions are moved by some 0.1 mm (on a map of 200 m), towards the
     UEs on whose edge of coverage they lie and towards the inside of the map.
     """
-    scenario = system.scenario
+    scenario = physics.scenario
     shift = 4 * torch.finfo(torch.float32).eps * scenario.map_side
-    to_ues = system.ue_positions - path.unsqueeze(-2)
+    to_ues = physics.nodes.ue - path.unsqueeze(-2)
     distance = torch.linalg.vector_norm(to_ues, dim=-1)
     on_edge = (distance - scenario.coverage_radius).abs() < shift / 2
     inwards = (F.normalize(to_ues, dim=-1) * on_edge.unsqueeze(-1)).sum(dim=-2)
     inside = scenario.map_side / 2 - shift
     targets = (path + shift * F.normalize(inwards, dim=-1)).clamp(-inside, inside)
     # A shifted position may lie just out of reach of the one before: fly there as the helper can.
-    norm_limit = system.norm_limit([scheme])
+    norm_limit = physics.norm_limit([mode_rule])
     norm_limit = None if norm_limit is None else norm_limit[0]
     step_length = scenario.max_speed * scenario.slot_duration
     flown = [path[0]]
     for target in targets[1:]:
         action = (target - flown[-1]) / step_length
-        flown.append(system.move(flown[-1], action, norm_limit).position)
+        velocity = physics.velocity(action, norm_limit)
+        flown.append(physics.move(flown[-1], velocity).position)
     return torch.stack(flown)
+
+
+def _power(scenario: Scenario, modes: Tensor) -> Tensor:
+    powers = torch.tensor([scenario.jamming_power, scenario.relay_power], dtype=torch.float64)
+    return powers[modes]

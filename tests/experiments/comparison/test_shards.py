@@ -24,7 +24,7 @@ from hyuav.learning.cohort import Learner
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.registry import PEER
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.references.optimum import solve
+from hyuav.references.optimum import solve_optimum
 
 TRAINING = TrainingParameters(
     num_episodes=5,
@@ -36,7 +36,7 @@ TRAINING = TrainingParameters(
 )
 EVALUATION = EvaluationParameters(episodes=7, resolution=10.0)
 SCENARIO = Scenario(
-    ue_positions=((5.0, 6.0), (-7.0, 8.0)), helper_start=(-20.0, -20.0), num_slots=6
+    ue_positions=((5.0, 6.0), (-7.0, 8.0)), helper_starts=(-20.0, -20.0), num_slots=6
 )
 LEARNERS = tuple(Learner(scheme, seed) for scheme in ("relay", "hybrid") for seed in (3, 4))
 
@@ -57,7 +57,7 @@ def shard(optima: Optima, parent: Path, algorithm: str = "ddpg") -> Shard:
 
 
 def test_the_optima_are_kept_as_they_were_found(optima: Optima) -> None:
-    found = solve(SCENARIO, resolution=EVALUATION.resolution)
+    found = solve_optimum(SCENARIO, resolution=EVALUATION.resolution)
     for scheme, optimum in found.items():
         path = optima.policy(scheme, 6).module.get_buffer("path")
         assert np.array_equal(path, optimum.path)

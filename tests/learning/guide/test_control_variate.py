@@ -12,21 +12,22 @@ from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.control_variate import LUCK, ControlVariate
 from hyuav.learning.replay import FADING
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Physics
+from reference import hover
 
 SCENARIO = Scenario.preset("random_disk")
-SYSTEM = SecureOffloadingSystem(SCENARIO)
+PHYSICS = Physics(SCENARIO)
 
 
 def slots(size: int, seed: int, spread: float = 30.0) -> TensorDictBase:
     """Slots (1, size) of relaying somewhere about the middle of the map."""
     generator = torch.Generator().manual_seed(seed)
     position = spread * torch.randn(1, size, 2, generator=generator) - 10.0
-    fading = SYSTEM.draw_fading((1, size), generator)
+    fading = PHYSICS.draw_fading((1, size), generator)
     assert fading is not None
     mode = torch.randint(0, 2, (1, size, 1), generator=generator) * 2.0 - 1.0
-    distances = SYSTEM.distances(position) / 100.0 - 1.0
-    reward, _ = SYSTEM.sum_rates(position, fading)
+    slot = hover(PHYSICS, position, fading)
+    distances, reward = slot.distances.flatten(-2) / 100.0 - 1.0, slot.relay.sum_rate
     after = TensorDict(
         observation=torch.cat([position / 100.0, mode, distances], dim=-1),
         reward=reward.unsqueeze(-1),

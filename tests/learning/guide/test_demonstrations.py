@@ -94,7 +94,7 @@ def test_the_way_of_the_best_flight_is_kept_with_its_actions() -> None:
         trained.fly()
     flights, scale = best(trained), SCENARIO.max_speed / 100.0
     way = flights.way
-    start = torch.tensor(SCENARIO.helper_start) / 100.0
+    start = torch.tensor(SCENARIO.helper_starts[0]) / 100.0
     before = torch.cat([start.expand(1, 3, 2), way[:-1]])
     flown = before + scale * flights.actions
     inside = flown.abs() <= 1.0

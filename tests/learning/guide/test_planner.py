@@ -17,7 +17,7 @@ from hyuav.learning.guide.demonstrations import AHEAD, BestFlights
 from hyuav.learning.guide.planner import FlightSearch
 from hyuav.learning.guide.proposals import Imagination
 from hyuav.learning.guide.reward_model import Expectation
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Physics
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
 
@@ -48,8 +48,8 @@ def flown(x: float, learners: int = 2) -> TensorDictBase:
 
 def search(imagined: int = 0) -> tuple[FlightSearch, BestFlights, FarIsBetter]:
     flights, expectation = BestFlights(2, SCENARIO), FarIsBetter(2)
-    system = SecureOffloadingSystem(SCENARIO)
-    imagination = Imagination(imagined, system, ["hybrid"] * 2) if imagined else None
+    physics = Physics(SCENARIO)
+    imagination = Imagination(imagined, physics, ["hybrid"] * 2) if imagined else None
     return FlightSearch(flights, expectation, imagination, [1, 2]), flights, expectation
 
 

@@ -9,7 +9,7 @@ import torch
 from hyuav import Scenario, make_env
 from hyuav.learning.guide.demonstrations import BestFlights
 from hyuav.learning.guide.proposals import Imagination
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Physics
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
 
@@ -18,9 +18,9 @@ DEAR = {"jamming_power": 1000.0}  # a helper that may jam has less left to fly
 SMALL = {
     "map_side": 60.0,
     "max_speed": 19.0,
-    "helper_start": (-10.0, -10.0),
+    "helper_starts": (-10.0, -10.0),
     "legitimate_position": (0.0, 0.0),
-    "eavesdropper_position": (20.0, 20.0),
+    "eavesdropper_positions": (20.0, 20.0),
     "ue_positions": ((5.0, 6.0), (-7.0, 8.0)),
 }
 
@@ -28,7 +28,7 @@ SMALL = {
 def flights(scenario: Scenario) -> BestFlights:
     """The best hovers at the start, the one that was tried flies along x."""
     known = BestFlights(2, scenario)
-    start = torch.tensor(scenario.helper_start) / (scenario.map_side / 2)
+    start = torch.tensor(scenario.helper_starts[0]) / (scenario.map_side / 2)
     known.way.copy_(start.expand_as(known.way))
     reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
     known.tried_way.copy_(known.way)
@@ -45,7 +45,7 @@ def normals(imagined: int) -> torch.Tensor:
 def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofence: bool) -> None:
     scenario = dataclasses.replace(SCENARIO, **changes)
     schemes = ["hybrid", "relay"]
-    imagination = Imagination(35, SecureOffloadingSystem(scenario), schemes)
+    imagination = Imagination(35, Physics(scenario), schemes)
     actions, way = imagination.fly(3, flights(scenario), normals(35))
     assert actions.shape == way.shape == (6, 2, 70, 2)
     env = make_env(scenario, schemes, (2, 70), seed=0, geofence=geofence)
@@ -53,14 +53,15 @@ def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofen
     for action, place in zip(actions, way, strict=True):
         state = env.step_mdp(env.step(state.set("action", action)))
         assert not state["off_map"].any()
-        torch.testing.assert_close(state["position"], place * half_side, atol=1e-3, rtol=0.0)
+        flown = state["position"].squeeze(-2)
+        torch.testing.assert_close(flown, place * half_side, atol=1e-3, rtol=0.0)
     straight = way[:, :, :35]
     assert torch.equal(straight[:, 0], straight[:, 1]) == (changes != DEAR)
 
 
 def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_reached() -> None:
     scenario = dataclasses.replace(SCENARIO, num_slots=10)
-    imagination = Imagination(50, SecureOffloadingSystem(scenario), ["hybrid", "hybrid"])
+    imagination = Imagination(50, Physics(scenario), ["hybrid", "hybrid"])
     known, drawn = flights(scenario), normals(50)
     ways = [imagination.fly(episode, known, drawn)[1] for episode in range(40)]
     ends = torch.stack([way[-1, 0, :50] for way in ways]).flatten(0, 1)
@@ -70,7 +71,7 @@ def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_
 
 
 def test_variations_lead_beside_the_flights_that_they_vary() -> None:
-    imagination = Imagination(400, SecureOffloadingSystem(SCENARIO), ["hybrid", "hybrid"])
+    imagination = Imagination(400, Physics(SCENARIO), ["hybrid", "hybrid"])
     known = flights(SCENARIO)
     _, way = imagination.fly(1, known, normals(400))
     of_best, of_tried = way[:, :, 400:600], way[:, :, 600:]

@@ -11,10 +11,9 @@ from hyuav import Scenario
 from hyuav.learning.guide.control_variate import ControlVariate
 from hyuav.learning.guide.reward_model import MANY_UES, Expectation
 from hyuav.physics.layout import disk
-from hyuav.physics.slot import SecureOffloadingSystem
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
-SYSTEM = SecureOffloadingSystem(SCENARIO)
+UES = torch.tensor(SCENARIO.ue_positions)
 POWERS = 3 * SCENARIO.num_ues + 2
 
 
@@ -27,7 +26,7 @@ def expectation(
 
 def earned(place: Tensor) -> Tensor:
     """bps/Hz at places (..., 2) in units of half the map's side, by how many UEs are covered."""
-    distances = SYSTEM.distances(place * 100.0)[..., : SCENARIO.num_ues]
+    distances = torch.linalg.vector_norm(place.unsqueeze(-2) * 100.0 - UES, dim=-1)
     return (distances <= SCENARIO.coverage_radius).float().sum(dim=-1, keepdim=True) + place[
         ..., :1
     ]

@@ -182,8 +182,8 @@ def test_a_scenario_is_changed_flown_and_saved(
     expect(page.get_by_text(f"scenario={name}")).to_be_visible()
     saved = load(runs, name)
     assert saved.jamming_power == 0.02
-    assert -60.0 <= saved.eavesdropper_position[0] <= -40.0
-    assert 40.0 <= saved.eavesdropper_position[1] <= 60.0
+    assert -60.0 <= saved.eavesdropper_positions[0][0] <= -40.0
+    assert 40.0 <= saved.eavesdropper_positions[0][1] <= 60.0
 
 
 @WIDTHS

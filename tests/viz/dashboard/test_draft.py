@@ -62,11 +62,11 @@ def test_nodes_are_moved_added_and_taken_away() -> None:
     draft = drafts.with_ue(draft, (3.0, 4.0))
     draft = drafts.without_ue(draft, "UE 1")
     changed = Scenario.from_dict(draft)
-    assert changed.eavesdropper_position == (70.0, -5.0)
+    assert changed.eavesdropper_positions[0] == (70.0, -5.0)
     assert changed.ue_positions[0] == drafts.position(draft, "UE 1") == (1.0, 2.0)
     assert changed.ue_positions[-1] == (3.0, 4.0)
     assert changed.num_ues == SCENARIO.num_ues == len(drafts.nodes(draft)) - 3
-    assert set(drafts.changes(changed, SCENARIO)) == {"eavesdropper_position", "ue_positions"}
+    assert set(drafts.changes(changed, SCENARIO)) == {"eavesdropper_positions", "ue_positions"}
 
 
 def test_the_only_ue_stays() -> None:

@@ -241,11 +241,13 @@ def test_a_node_is_moved_by_its_coordinates(tmp_path: Path) -> None:
     before = page.metric[0].value
     page.selectbox(key="node").set_value("eavesdropper (E)").run()
     widget(page, "number_input", "x (m)").set_value(-70.0).run()
-    assert page.session_state["valid"].eavesdropper_position == (-70.0, 80.0)
+    assert page.session_state["valid"].eavesdropper_positions == ((-70.0, 80.0),)
     assert page.metric[0].value != before
     widget(page, "number_input", "y (m)").set_value(700.0).run()
     (line,) = errors(page)
-    assert line.startswith("eavesdropper_position = (-70.0, 700.0): expected a position on the map")
+    assert line.startswith(
+        "eavesdropper_positions[0] = (-70.0, 700.0): expected a position on the map"
+    )
 
 
 def test_a_checkpoint_flies_in_the_changed_scenario_until_it_does_not_fit(

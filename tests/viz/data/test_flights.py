@@ -12,12 +12,12 @@ def test_the_tables_hold_the_flights_from_the_start_and_all_nodes(
     flight = tables[""]
     assert set(flight["scheme"]) == {"re_lt"}
     assert flight["slot"].tolist() == list(range(11))
-    assert flight[["x", "y"]].iloc[0].to_list() == list(scenario.helper_start)
+    assert flight[["x", "y"]].iloc[0].to_list() == list(scenario.helper_starts[0])
     assert flight["relay"].tolist() == [None] + [True] * 10
     nodes = tables["nodes"].set_index("node")
     places = nodes[["x", "y"]].T.to_dict("list")
     assert places["UE 10"] == list(scenario.ue_positions[9])
-    assert places["E"] == list(scenario.eavesdropper_position)
+    assert places["E"] == list(scenario.eavesdropper_positions[0])
     assert nodes["coverage"].dropna().to_dict() == {"L": scenario.coverage_radius}
 
 

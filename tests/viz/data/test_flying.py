@@ -6,7 +6,7 @@ import pytest
 from dashboard_runs import SCENARIO
 from hyuav import Scenario
 from hyuav._support.errors import InputError
-from hyuav.references.optimum import solve
+from hyuav.references.optimum import solve_optimum
 from hyuav.viz.data.flying import (
     COARSE_DRAWS,
     checkpoint_of,
@@ -21,7 +21,7 @@ from hyuav.viz.data.index import RunIndex
 def test_the_optimum_of_the_page_is_that_of_the_solver() -> None:
     coarse = optimum(SCENARIO, "hybrid", fine=False)
     assert coarse.resolution == 4.0
-    expected = solve(SCENARIO, ["hybrid"], resolution=4.0, draws=COARSE_DRAWS)["hybrid"]
+    expected = solve_optimum(SCENARIO, ["hybrid"], resolution=4.0, draws=COARSE_DRAWS)["hybrid"]
     assert coarse.path.equal(expected.path)
 
 

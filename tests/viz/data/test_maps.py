@@ -6,8 +6,11 @@ import torch
 
 from dashboard_runs import SCENARIO
 from hyuav import Scenario
-from hyuav.physics.slot import SCHEMES, SecureOffloadingSystem
+from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.slot import Physics
+from hyuav.physics.tasks import mean_tasks
 from hyuav.viz.data.maps import RULE_MODES, helper_map
+from reference import hover
 
 
 def test_rates_stand_at_the_position_of_their_row_and_column() -> None:
@@ -28,16 +31,13 @@ def test_a_full_server_is_mapped_with_mean_tasks() -> None:
 def test_the_counts_are_of_the_ues_that_offload_there(crowded: bool) -> None:
     budget = 1.0 if crowded else SCENARIO.edge_energy_budget
     scenario = dataclasses.replace(SCENARIO, edge_energy_budget=budget)
-    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
+    physics, tasks = Physics(scenario, dtype=torch.float64), mean_tasks(scenario, torch.float64)
     for x, y in ((-20.0, -20.0), (80.0, 60.0), (-40.0, 20.0), (0.0, 0.0)):
         at = int((y + 100) / 20), int((x + 100) / 20)
-        distances = system.distances(torch.tensor([x, y], dtype=torch.float64))
-        gains = system.channel_gains(distances, None)
-        tasks = system.mean_tasks(()) if system.edge_can_saturate else None
-        relay = system.relay_outcome(distances, gains, tasks)
-        jamming = system.jamming_outcome(gains, tasks)
+        slot = hover(physics, [x, y], tasks=tasks)
+        relay, jamming = slot.relay, slot.jamming
         better = relay if relay.sum_rate > jamming.sum_rate else jamming
-        for rule, outcome in zip(SCHEMES, (better, relay, jamming), strict=True):
+        for rule, outcome in zip(MODE_RULES, (better, relay, jamming), strict=True):
             expected = int(outcome.offloading.sum())
             counts = helper_map(scenario, 20.0).offloading(RULE_MODES[rule])
             assert counts[at] == expected

@@ -106,7 +106,7 @@ def test_the_path_up_to_a_slot_is_solid_where_it_relayed_and_dashed_where_it_jam
         assert (_segments(relayed), _segments(jammed)) == (flown.sum(), (~flown).sum())
         assert relayed.line.dash == "solid"
         assert jammed.line.dash not in ("solid", None)
-        first = tuple(scenario.helper_start)
+        first = tuple(scenario.helper_starts[0])
         assert first in _points(relayed) | _points(jammed)
 
 

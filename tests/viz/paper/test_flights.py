@@ -29,7 +29,7 @@ def test_trajectories_lie_over_the_optimums_flight(
     (axes,) = figure.axes
     best = max(axes.lines, key=lambda line: line.get_linewidth())
     path = np.asarray(best.get_xydata())
-    assert path[0].tolist() == list(scenario.helper_start)
+    assert path[0].tolist() == list(scenario.helper_starts[0])
     assert len(path) == scenario.num_slots + 1
     own = [line for line in axes.lines if to_hex(line.get_color()) == COLORS["proposed"].lower()]
     dots = np.concatenate([line.get_xydata() for line in own if line.get_marker() == "o"])

@@ -52,8 +52,8 @@ class Optima:
                     "value": optimum.value,
                     "standard_error": optimum.standard_error,
                     "slot": range(num_slots + 1),
-                    "x": optimum.path[:, 0],
-                    "y": optimum.path[:, 1],
+                    "x": optimum.path[:, 0, 0],
+                    "y": optimum.path[:, 0, 1],
                 }
             )
             for scheme, optima in found.items()
@@ -69,7 +69,7 @@ class Optima:
         """
         flights = self._flights()
         flight = flights[(flights["scheme"] == scheme) & (flights["num_slots"] == num_slots)]
-        path = torch.tensor(flight.sort_values("slot")[["x", "y"]].to_numpy())
+        path = torch.tensor(flight.sort_values("slot")[["x", "y"]].to_numpy()).unsqueeze(1)
         return Policy(FlightPolicy(path, self.scenario))
 
     def _flights(self) -> pd.DataFrame:

@@ -26,8 +26,8 @@ from hyuav.learning.ddpg import DDPG
 from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
-from hyuav.physics.slot import SCHEMES
 
 ENTRIES = (*ALGORITHMS, PEER)
 """What can be compared."""
@@ -75,7 +75,7 @@ class Compare(Parameters):
     """Random layouts, besides the presets; see :func:`hyuav.physics.layout.random_layout`."""
     layouts_seed: int = parameter(count(0), 1000)
     """Of the first; the others follow."""
-    scheme: tuple[str, ...] = parameter(one_or_more(choice(*SCHEMES), "schemes"), tuple(SCHEMES))
+    scheme: tuple[str, ...] = parameter(one_or_more(choice(*MODE_RULES), "schemes"), MODE_RULES)
     num_slots: tuple[int, ...] = parameter(
         one_or_more(count(), "numbers of slots"), (10, 20), symbol="T"
     )

@@ -4,9 +4,11 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
 
+from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.networks import LearnerMLP
 from hyuav.learning.replay import FADING
+from hyuav.physics.channel import LinkRow
 from hyuav.physics.scenario import Scenario
 
 HIDDEN_SIZES = (64, 64)
@@ -37,11 +39,12 @@ class ControlVariate(nn.Module):
         super().__init__()
         self._scale = reward_scale
         self.afterstate = Afterstate(scenario, clock=clock, geofence=True)
-        outputs = 1 + 3 * scenario.num_ues + 2
+        self.layout = ObservationLayout(scenario, clock=clock)
+        outputs = 1 + LinkRow.of(scenario).size
         self.network = LearnerMLP(learners, self.afterstate.size, HIDDEN_SIZES, outputs, "tanh")
 
     def forward(self, place: Tensor, clock: Tensor) -> tuple[Tensor, Tensor]:
-        """What is to be expected of slots (N, ..., 1), and what each power adds (N, ..., 3 U + 2).
+        """What is to be expected of slots (N, ..., 1), and what each power adds (N, ..., links).
 
         Args:
             place: (N, ..., 2), where the helper is at their end, in units of half the map's side.
@@ -53,7 +56,7 @@ class ControlVariate(nn.Module):
     def _of(self, batch: TensorDictBase) -> tuple[Tensor, Tensor]:
         """As :meth:`forward`, of a mini-batch; the mode, which the fading decides, is not used."""
         following = batch["next", "observation"]
-        return self(following[..., :2], following[..., -1:])
+        return self(self.layout.position(following), self.layout.clock(following))
 
     @torch.no_grad()
     def luck(self, batch: TensorDictBase) -> Tensor:

@@ -4,6 +4,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
 
+from hyuav.envs.observation import ObservationLayout
 from hyuav.physics.scenario import Scenario
 
 
@@ -48,6 +49,7 @@ class BestFlights(nn.Module):
     def __init__(self, learners: int, scenario: Scenario) -> None:
         super().__init__()
         shape = scenario.num_slots, learners, 2
+        self._layout = ObservationLayout(scenario, clock=True)
         self._slots_per_unit = scenario.num_slots / 2
         self._reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
         self.register_buffer("reward", torch.full((learners,), -torch.inf))
@@ -91,10 +93,11 @@ class BestFlights(nn.Module):
         Before there is one, they hover.
 
         Args:
-            observation: (N, K, U + 6), with a clock.
+            observation: (N, K, ...), with a clock.
         """
-        flown = ((observation[..., -1] + 1.0) * self._slots_per_unit).round().long()
+        clock = self._layout.clock(observation).squeeze(-1)
+        flown = ((clock + 1.0) * self._slots_per_unit).round().long()
         slot = flown.clamp(max=len(self.actions) - 1).unsqueeze(-1).expand(*flown.shape, 2)
         position = torch.take_along_dim(self.way.transpose(0, 1), slot, dim=1)
-        action = (position - observation[..., :2]) / self._reach
+        action = (position - self._layout.position(observation)) / self._reach
         return action.clamp(-1.0, 1.0).nan_to_num(0.0)

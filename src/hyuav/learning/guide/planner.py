@@ -61,7 +61,7 @@ class FlightSearch:
         judges = (episode + 1) % JUDGED_EVERY == 0
         if judges:
             expectation.update(memory, next(self.streams["guesses"]))
-        way = flown["next", "observation"][..., :2]
+        way = expectation.variate.layout.position(flown["next", "observation"])
         flights.reward.copy_(expectation.of(flights.way)[0].nan_to_num(-torch.inf))
         flights.keep(flown["action"], way, expectation.of(way)[0])
         if imagines and self._imagination is not None:

@@ -8,7 +8,7 @@ from torch import Tensor
 from hyuav.envs.transforms import WITHIN
 from hyuav.learning.exploration import EVENLY, destinations
 from hyuav.learning.guide.demonstrations import BestFlights
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Physics
 
 FINEST = 40.0
 """A variation's smallest typical displacement is this part of what is flown in a slot."""
@@ -25,21 +25,19 @@ class Imagination:
 
     Args:
         flights: D, straight ones, and as many variations.
-        system: that is flown.
+        physics: of the scenario that is flown.
         schemes: of the N learners.
     """
 
-    def __init__(
-        self, flights: int, system: SecureOffloadingSystem, schemes: Sequence[str]
-    ) -> None:
-        self._system = system
-        self._places = torch.arange(flights, dtype=torch.float64, device=system.device)
-        limit = system.norm_limit(schemes)
+    def __init__(self, flights: int, physics: Physics, schemes: Sequence[str]) -> None:
+        self._physics = physics
+        self._places = torch.arange(flights, dtype=torch.float64, device=physics.device)
+        limit = physics.norm_limit(schemes)
         self._norm_limit = None if limit is None else limit.unsqueeze(1)
         self._learners = len(schemes)
         self.normals = (flights, 5)
         """Shape of the standard normal numbers that make the variations of one learner."""
-        scenario = system.scenario
+        scenario = physics.scenario
         self._half_side = scenario.map_side / 2
         self._reach = scenario.max_speed * scenario.slot_duration / self._half_side
 
@@ -55,11 +53,12 @@ class Imagination:
             the actions (T, N, 2 D, 2), and where they lead, in units of half the map's side.
         """
         towards = torch.cat([self._straight(episode), self._variations(flights, normals)], dim=2)
-        position = self._system.helper_start.expand(*towards.shape[1:])
+        position = self._physics.nodes.helper.flatten().expand(*towards.shape[1:])
         actions, way = [], []
         for target in towards:
             action = ((target - position / self._half_side) / self._reach).clamp(-1.0, 1.0)
-            position = self._system.move(position, action, self._norm_limit).position
+            velocity = self._physics.velocity(action, self._norm_limit)
+            position = self._physics.move(position, velocity).position
             actions.append(action)
             way.append(position / self._half_side)
         return torch.stack(actions), torch.stack(way)
@@ -68,8 +67,8 @@ class Imagination:
         """Where to fly in each slot: (T, N, D, 2)."""
         places = self._places + len(self._places) * episode
         share = torch.stack([torch.frac(places * multiple) for multiple in EVENLY], dim=-1)
-        ends = destinations(share.to(self._system.dtype)) * WITHIN
-        return ends.expand(self._system.scenario.num_slots, self._learners, *ends.shape)
+        ends = destinations(share.to(self._physics.dtype)) * WITHIN
+        return ends.expand(self._physics.scenario.num_slots, self._learners, *ends.shape)
 
     def _variations(self, flights: BestFlights, normals: Tensor) -> Tensor:
         """The same of variations."""

@@ -85,7 +85,8 @@ class Expectation(nn.Module):
         """
         memory = memory.transpose(0, 1)
         following = memory["next", "observation"]
-        features = self.features(following[..., :2], following[..., -1:])
+        layout = self.variate.layout
+        features = self.features(layout.position(following), layout.clock(following))
         luck = self.variate.luck(memory)
         fair = (memory["next", "reward"] - luck) / self._scale
         transposed = features.transpose(1, 2)

@@ -16,30 +16,28 @@ Draft = dict[str, Any]
 
 NODES = {
     "legitimate_position": LEGITIMATE_LABEL,
-    "eavesdropper_position": EAVESDROPPER_LABEL,
-    "helper_start": "helper's start (H)",
+    "eavesdropper_positions": EAVESDROPPER_LABEL,
+    "helper_starts": "helper's start (H)",
 }
 """The nodes that every scenario has, beside the UEs."""
 
-GROUPS = {
-    "Flight": (
-        *("num_slots", "slot_duration", "max_speed", "speed_limit", "off_map_penalty"),
-        *("map_side", "altitude", "eavesdropper_altitude", "helper_mass"),
-    ),
-    "Radio": (
-        *("ue_power", "jamming_power", "relay_power", "noise_power", "ground_to_air_gain"),
-        *("air_to_air_gain", "ground_to_air_k_factor", "air_to_air_k_factor", "fading"),
-    ),
-    "Tasks": (
-        *("coverage_radius", "min_secrecy_rate", "task_size", "cycles_per_bit", "capacitance"),
-        *("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"),
-    ),
-}
-"""All parameters but the positions."""
+_FLIGHT = (
+    *("num_slots", "slot_duration", "max_speed", "speed_limit", "off_map_penalty"),
+    *("map_side", "altitude", "eavesdropper_altitude", "helper_mass"),
+)
+_TASKS = (
+    *("coverage_radius", "min_secrecy_rate", "task_size", "cycles_per_bit", "capacitance"),
+    *("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"),
+)
 
 CHOICES = {"speed_limit": ("box", "disc")}
 
 FIELDS = {field.name: field for field in dataclasses.fields(Scenario)}
+
+_RADIO = tuple(name for name in FIELDS if name not in (*NODES, "ue_positions", *_FLIGHT, *_TASKS))
+
+GROUPS = {"Flight": _FLIGHT, "Radio": _RADIO, "Tasks": _TASKS}
+"""All parameters but the positions; what has no other group is of the radio."""
 
 KINDS: dict[str, Any] = typing.get_type_hints(Scenario)
 
@@ -89,14 +87,16 @@ def position(draft: Draft, node: str) -> Point:
     if node.startswith("UE "):
         x, y = draft["ue_positions"][int(node[3:]) - 1]
     else:
-        x, y = draft[_field(node)]
+        place = draft[_field(node)]
+        x, y = place if _field(node) == "legitimate_position" else place[0]
     return float(x), float(y)
 
 
 def moved(draft: Draft, node: str, to: Point) -> Draft:
     """The draft with a node elsewhere."""
     if not node.startswith("UE "):
-        return {**draft, _field(node): to}
+        field = _field(node)
+        return {**draft, field: to if field == "legitimate_position" else [to]}
     ues = list(draft["ue_positions"])
     ues[int(node[3:]) - 1] = to
     return {**draft, "ue_positions": ues}

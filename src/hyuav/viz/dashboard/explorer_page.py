@@ -11,8 +11,8 @@ from hyuav._support.formatting import percent
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import named_scenario
 from hyuav.experiments.schemes import LEARNED, OPTIMA
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
-from hyuav.physics.slot import SCHEMES
 from hyuav.viz.dashboard import draft as drafts
 from hyuav.viz.dashboard.draft_widgets import editor, place
 from hyuav.viz.dashboard.flights_page import player
@@ -149,7 +149,7 @@ def _save(root: Path, scenario: Scenario) -> None:
 def _explore(index: RunIndex, scenario: Scenario) -> Evaluation | None:
     """The map of the scenario with the flights, and what they bring."""
     first, second = st.columns(2)
-    rule = first.radio("Mode chosen by", SCHEMES, key="rule", horizontal=True)
+    rule = first.radio("Mode chosen by", MODE_RULES, key="rule", horizontal=True)
     mapped = second.radio(
         "Map", list(QUANTITIES), format_func=QUANTITIES.__getitem__, key="mapped", horizontal=True
     )

@@ -113,8 +113,8 @@ def _flight(flight: Flight) -> Iterator[go.Scatter]:
 def _start(scenario: Scenario) -> go.Scatter:
     marker = {"symbol": "diamond", "size": 11, "color": HELPER_COLOR}
     return go.Scatter(
-        x=[scenario.helper_start[0]],
-        y=[scenario.helper_start[1]],
+        x=[scenario.helper_starts[0][0]],
+        y=[scenario.helper_starts[0][1]],
         mode="markers",
         marker=marker | {"line": {"color": "white", "width": 1}},
         name="helper's start",

@@ -68,7 +68,7 @@ def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode:
     others = rows[["edge_energy", "helper_energy"]].to_numpy(float)
     return Flight(
         scheme,
-        np.vstack([scenario.helper_start, rows[["x", "y"]].to_numpy(float)]),
+        np.vstack([scenario.helper_starts[0], rows[["x", "y"]].to_numpy(float)]),
         rows["relay"].to_numpy(bool),
         np.array(lists["offloading"], dtype=bool),
         np.array(lists["secrecy_rate"], dtype=float),
@@ -128,7 +128,7 @@ def flight_tables(
         }
         paths.append(pd.DataFrame(columns))
     places = {f"UE {ue}": place for ue, place in enumerate(scenario.ue_positions, start=1)}
-    places |= {"L": scenario.legitimate_position, "E": scenario.eavesdropper_position}
+    places |= {"L": scenario.legitimate_position, "E": scenario.eavesdropper_positions[0]}
     nodes = pd.DataFrame([(name, *place) for name, place in places.items()])
     nodes.columns = pd.Index(["node", "x", "y"])
     nodes["coverage"] = [scenario.coverage_radius if name == "L" else np.nan for name in places]

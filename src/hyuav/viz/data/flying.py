@@ -15,7 +15,7 @@ from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.cohort import Learner
 from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve
+from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve_optimum
 from hyuav.viz.data.index import RunIndex, Stamp
 
 MOST_SLOTS, MOST_UES = 500, 200
@@ -97,7 +97,9 @@ def optimum(scenario: Scenario, rule: str, *, fine: bool) -> Optimum:
     """
     spacing = resolution(scenario, fine=fine)
     draws = FINE_DRAWS if fine else COARSE_DRAWS
-    return solve(scenario, [rule], resolution=spacing, draws=draws, evaluation_draws=2000)[rule]
+    return solve_optimum(scenario, [rule], resolution=spacing, draws=draws, evaluation_draws=2000)[
+        rule
+    ]
 
 
 @lru_cache(maxsize=128)

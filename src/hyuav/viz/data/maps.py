@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from hyuav.physics.offloading import prefers_relay
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SecureOffloadingSystem
+from hyuav.physics.slot import Control, Physics, slot
+from hyuav.physics.tasks import mean_tasks
 
 Mode = Literal["relay", "jamming", "better"]
 """The helper's mode on a map; ``better`` is the one that brings more at each position."""
@@ -72,14 +73,13 @@ def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
     half = scenario.map_side / 2
     axis = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64)
     y, x = torch.meshgrid(axis, axis, indexing="ij")
-    system = SecureOffloadingSystem(scenario, dtype=torch.float64)
-    distances = system.distances(torch.stack([x, y], dim=-1))
-    tasks = system.mean_tasks(tuple(x.shape)) if system.edge_can_saturate else None
-    gains = system.channel_gains(distances, None)
-    relay = system.relay_outcome(distances, gains, tasks)
-    jamming = system.jamming_outcome(gains, tasks)
-    rates = torch.broadcast_tensors(relay.sum_rate, jamming.sum_rate)
-    counts = (outcome.offloading.expand(*x.shape, -1).sum(dim=-1) for outcome in (relay, jamming))
+    physics = Physics(scenario, dtype=torch.float64)
+    positions = torch.stack([x, y], dim=-1).unsqueeze(-2)
+    nodes, hovering = physics.nodes._replace(helper=positions), Control(torch.zeros_like(positions))
+    over = slot(physics, nodes, hovering, tasks=mean_tasks(scenario, torch.float64))
+    modes = over.relay, over.jamming
+    rates = torch.broadcast_tensors(*(mode.sum_rate for mode in modes))
+    counts = (mode.offloading.expand(*x.shape, -1).sum(dim=-1) for mode in modes)
     return HelperMap(
         axis.numpy(),
         *(values.numpy() for values in (*rates, *counts, prefers_relay(*rates))),

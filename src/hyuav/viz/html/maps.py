@@ -101,7 +101,7 @@ def _add_nodes(figure: go.Figure, scenario: Scenario) -> None:
         (LEGITIMATE_LABEL, *_at(scenario.legitimate_position, "square", LEGITIMATE_COLOR)),
         (
             EAVESDROPPER_LABEL,
-            *_at(scenario.eavesdropper_position, "triangle-down", EAVESDROPPER_COLOR),
+            *_at(scenario.eavesdropper_positions[0], "triangle-down", EAVESDROPPER_COLOR),
         ),
     )
     for name, across, up, marker in nodes:

@@ -64,7 +64,10 @@ def moving_on_map(scenario: Scenario, flight: Flight, slot: int, color: str) -> 
         *_ues(scenario, flight, slot, helper),
         _uav(scenario.legitimate_position, LEGITIMATE_LABEL, "square", LEGITIMATE_COLOR),
         _uav(
-            scenario.eavesdropper_position, EAVESDROPPER_LABEL, "triangle-down", EAVESDROPPER_COLOR
+            scenario.eavesdropper_positions[0],
+            EAVESDROPPER_LABEL,
+            "triangle-down",
+            EAVESDROPPER_COLOR,
         ),
         _uav(helper, HELPER_LABEL, "circle-open", color),
     ]
@@ -90,7 +93,7 @@ def _links(
 ) -> list[Trace]:
     """The links that are alive: a UE's while it offloads, the helper's in its mode."""
     senders = [ue for ue, sends in zip(scenario.ue_positions, offloading, strict=True) if sends]
-    legitimate, eavesdropper = scenario.legitimate_position, scenario.eavesdropper_position
+    legitimate, eavesdropper = scenario.legitimate_position, scenario.eavesdropper_positions[0]
     alive = {
         "UE → L": [(ue, legitimate) for ue in senders],
         "UE → H": [(ue, helper) for ue in senders if relay],

@@ -97,7 +97,7 @@ def _draw_letters(axes: Axes, scenario: Scenario, helper: Point) -> None:
     """Name the UAVs: the helper within its ring, the others beside their places."""
     places = {
         "L": (scenario.legitimate_position, (9, -9)),
-        "E": (scenario.eavesdropper_position, (-10, 7)),
+        "E": (scenario.eavesdropper_positions[0], (-10, 7)),
         "H": (helper, (0, 0)),
     }
     for letter, (place, offset) in places.items():
@@ -128,7 +128,7 @@ def _draw_links(axes: Axes, scenario: Scenario, flight: Flight, flown: int) -> N
         ends = (helper, scenario.legitimate_position)
         axes.plot(*zip(*ends, strict=True), **style | {"linewidth": 1.6})
     if not relays:
-        ends = (helper, scenario.eavesdropper_position)
+        ends = (helper, scenario.eavesdropper_positions[0])
         axes.plot(*zip(*ends, strict=True), **JAMMING, zorder=2.6)
 
 

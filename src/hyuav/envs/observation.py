@@ -1,0 +1,130 @@
+"""What one learner sees of all helpers and how it steers them: one row of numbers for each."""
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+from torchrl.data import Bounded, Composite, Unbounded
+from torchrl.envs import Transform
+
+from hyuav.envs.arguments import require_shape
+from hyuav.physics.scenario import Scenario
+
+
+class ObservationLayout:
+    """Where the numbers of a learner's ``observation`` and ``action`` stand.
+
+    An observation holds, in this order, the positions of the helpers (2 H), their modes (H) and
+    their distances to the UEs, L and the eavesdroppers (H (U + 1 + E)), and with a clock the
+    slots flown. An action holds the helpers' velocities (2 H). All are of order one.
+
+    Args:
+        scenario: that is flown; it tells the numbers U of UEs, H of helpers, E of eavesdroppers.
+        clock: whether the slots flown are observed.
+    """
+
+    def __init__(self, scenario: Scenario, *, clock: bool) -> None:
+        self.num_helpers = scenario.num_helpers
+        """H."""
+        self.action_size = 2 * self.num_helpers
+        """Numbers of an action."""
+        self.num_distances = scenario.num_ues + 1 + scenario.num_eavesdroppers
+        """Of one helper."""
+        self.size = self.num_helpers * (3 + self.num_distances) + clock
+        """Numbers of an observation."""
+
+    def position(self, observation: Tensor) -> Tensor:
+        """Where the helpers are: (..., 2 H), in units of half the map's side.
+
+        Args:
+            observation: (..., size).
+        """
+        return observation[..., : self.action_size]
+
+    def clock(self, observation: Tensor) -> Tensor:
+        """The slots flown, from -1 (none) to 1 (all): (..., 1).
+
+        Without a clock it is a number of no meaning.
+
+        Args:
+            observation: (..., size).
+        """
+        return observation[..., -1:]
+
+    def distances(self, values: Tensor) -> Tensor:
+        """The part (..., H (U + 1 + E)) of an observation, or of its bounds, that is distances.
+
+        Args:
+            values: (..., size).
+        """
+        first = 3 * self.num_helpers
+        return values[..., first : first + self.num_helpers * self.num_distances]
+
+
+class JointView(Transform):
+    """Let one learner see and steer all helpers, by one ``observation`` and one flat ``action``.
+
+    Gathers ``observation`` as :class:`ObservationLayout` has it and brings each entry to order one
+    by constants alone: coordinates are divided by half the map's side, a mode becomes -1 (jamming)
+    or 1 (relay), and distances from 0 to the map's side become -1 to 1. With a clock, the slots
+    flown follow, from -1 (none) to 1 (all). On its way to the environment, ``action`` (2 H,) gets
+    the helper's axis, (H, 2).
+
+    Args:
+        scenario: its nodes, map and horizon.
+        clock: append the slots flown.
+
+    Raises:
+        InputError: (in a step) the action has another shape.
+    """
+
+    def __init__(self, scenario: Scenario, *, clock: bool) -> None:
+        keys = ["position", "mode", "distances", *(["step_count"] if clock else [])]
+        super().__init__(
+            in_keys=keys,
+            out_keys=["observation"],
+            in_keys_inv=["action"],
+            out_keys_inv=["action"],
+        )
+        self.layout = ObservationLayout(scenario, clock=clock)
+        """Of the observations that are made here."""
+        self._half_side = scenario.map_side / 2
+        self._half_horizon = scenario.num_slots / 2 if clock else None
+
+    def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the observation beside the entries that it is made of."""
+        parts = [
+            next_tensordict["position"].flatten(-2) / self._half_side,
+            next_tensordict["mode"] * 2.0 - 1.0,
+            next_tensordict["distances"].flatten(-2) * (1.0 / self._half_side) - 1.0,
+        ]
+        if self._half_horizon is not None:
+            parts.append(next_tensordict["step_count"] / self._half_horizon - 1.0)
+        next_tensordict["observation"] = torch.cat(parts, dim=-1)
+        return next_tensordict
+
+    def _reset(self, _: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
+        """Observe the start as well."""
+        return self._call(tensordict_reset)
+
+    def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Give the action that the environment takes the helper's axis."""
+        action = tensordict["action"]
+        require_shape("action", action, (*tensordict.batch_size, self.layout.action_size))
+        tensordict["action"] = action.unflatten(-1, (self.layout.num_helpers, 2))
+        return tensordict
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        """Add the observation to the specs."""
+        shape = (*observation_spec.shape, self.layout.size)
+        observation_spec["observation"] = Unbounded(
+            shape, dtype=torch.float32, device=observation_spec.device
+        )
+        return observation_spec
+
+    def transform_action_spec(self, action_spec: Composite) -> Composite:
+        """Flatten the action's spec."""
+        shape = (*action_spec.shape, self.layout.action_size)
+        action_spec["action"] = Bounded(
+            -1.0, 1.0, shape, dtype=torch.float32, device=action_spec.device
+        )
+        return action_spec
