@@ -16,7 +16,9 @@ ROOMS = {
 }
 """Pages and their titles."""
 
-SHARED = {"physics": ("hyuav._support.errors", "hyuav._support.parameters")}
+SHARED = {
+    "physics": ("hyuav._support.errors", "hyuav._support.parameters", "hyuav._support.yaml_files")
+}
 """Modules that stand beside the packages, by the page that shows them."""
 
 

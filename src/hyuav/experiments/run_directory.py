@@ -18,7 +18,8 @@ from torch import Tensor
 from hyuav._support.durable import create_durably
 from hyuav._support.errors import BusyError, InputError, rejection, require_choice
 from hyuav._support.files import open_regular, read_regular
-from hyuav._support.parameters import mapping, read_yaml, sequence
+from hyuav._support.parameters import mapping, sequence
+from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import IDENTITY, parse_rows
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint

@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 
 from hyuav._support.durable import create_durably, write_durably
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import read_yaml
+from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import PLAIN, Compare, parameters_of, training_episodes
 from hyuav.experiments.comparison.shards import Shard

@@ -14,7 +14,7 @@ import pandas as pd
 import yaml
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import YAML_LOADER, require_plain_yaml
+from hyuav._support.yaml_files import YAML_LOADER, require_plain_yaml
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, OPTIMA
 from hyuav.experiments.metrics import parse_rows
 from hyuav.experiments.run_directory import RunDirectory
