@@ -6,28 +6,26 @@ python recipes/draw.py run=runs/NAME figures=[trajectories,animation]
 
 import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError
-from hyuav._support.parameters import Parameters, choice, one_or_more, optional, parameter, text
+from hyuav._support.parameters import OneOrMore, Parameters, Text, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
 from hyuav.experiments.run_directory import RunDirectory, require_writable
-from hyuav.viz.paper.gallery import FIGURES, draw
+from hyuav.viz.paper.gallery import FigureName, draw
 
 
 @dataclass(frozen=True)
 class Draw(Parameters):
     """Which figures of which run."""
 
-    run: str | None = parameter(optional(text), None)
-    figures: tuple[str, ...] | None = parameter(
-        optional(one_or_more(choice(*FIGURES), f"a list of {', '.join(FIGURES)}")), None
-    )
+    run: Text | None = parameter(None)
+    figures: OneOrMore[FigureName] | None = parameter(None)
     """None for all that the run's files allow."""
 
 

@@ -9,22 +9,14 @@ import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
 
 import dataclasses
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import (
-    Parameters,
-    count,
-    one_or_more,
-    optional,
-    parameter,
-    text,
-    thread_count,
-)
+from hyuav._support.parameters import Count, OneOrMore, Parameters, Text, Threads, parameter
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.configuration import Config, recipe, section
 from hyuav.experiments.evaluation import (
@@ -45,12 +37,12 @@ from hyuav.viz.paper import save_flight_map
 class Evaluate(Parameters):
     """What to evaluate and where to."""
 
-    run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "run directories")), None)
-    num_slots: int | None = parameter(optional(count()), None, symbol="T")
+    run: OneOrMore[Text] | None = parameter(None)
+    num_slots: Count | None = parameter(None, symbol="T")
     """The horizon, of whose learners the runs must have some; the scenario's where it is None."""
-    output: str | None = parameter(optional(text), None)
-    device: str = parameter(text, "cpu")
-    threads: int = parameter(thread_count, 1)
+    output: Text | None = parameter(None)
+    device: Text = parameter("cpu")
+    threads: Threads = parameter(1)
 
 
 @recipe(

@@ -6,21 +6,14 @@ python recipes/report.py run=[runs/ONE,runs/OTHER]
 
 import hyuav_start  # noqa: F401 - first: the rest takes seconds to load
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError
-from hyuav._support.parameters import (
-    Parameters,
-    one_or_more,
-    optional,
-    parameter,
-    text,
-    thread_count,
-)
+from hyuav._support.parameters import OneOrMore, Parameters, Text, Threads, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
 from hyuav.viz.html.page import write_report
@@ -30,9 +23,9 @@ from hyuav.viz.html.page import write_report
 class Report(Parameters):
     """What to report on."""
 
-    run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "directories")), None)
+    run: OneOrMore[Text] | None = parameter(None)
     """Directories of runs or comparisons, finished or not."""
-    threads: int = parameter(thread_count, 1)
+    threads: Threads = parameter(1)
 
 
 @recipe("report", Report, groups={}, sections={}, run_directory=".")

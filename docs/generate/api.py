@@ -16,9 +16,7 @@ ROOMS = {
 }
 """Pages and their titles."""
 
-SHARED = {
-    "physics": ("hyuav._support.errors", "hyuav._support.parameters", "hyuav._support.yaml_files")
-}
+SHARED = {"physics": ("hyuav._support.errors", "hyuav._support.parameters")}
 """Modules that stand beside the packages, by the page that shows them."""
 
 

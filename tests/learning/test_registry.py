@@ -4,27 +4,27 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic.dataclasses import dataclass
 
 from hyuav import InputError, InputTypeError, register
-from hyuav._support.parameters import number, parameter
+from hyuav._support.parameters import NonNegativeNumber, parameter
 from hyuav.experiments.run_directory import named_algorithm
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.registry import ALGORITHMS, run_own_files
 
 OWN = """
-from dataclasses import dataclass
 from hyuav import DDPG, register
-from hyuav._support.parameters import number, parameter
+from hyuav._support.parameters import NonNegativeNumber, parameter
+from pydantic.dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Own(DDPG):
-    boldness: float = parameter(number(0.0), 2.0)
+    boldness: NonNegativeNumber = parameter(2.0)
 
 register("own", Own)
 """
@@ -32,12 +32,12 @@ register("own", Own)
 
 @dataclass(frozen=True)
 class Bold(DDPG):
-    boldness: float = parameter(number(0.0), 2.0)
+    boldness: NonNegativeNumber = parameter(2.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Demanding(DDPG):
-    boldness: float = parameter(number(0.0))
+    boldness: NonNegativeNumber = parameter()
 
 
 @pytest.fixture(autouse=True)

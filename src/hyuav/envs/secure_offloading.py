@@ -10,7 +10,7 @@ from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import switch
+from hyuav._support.parameters import checked
 from hyuav.envs.arguments import (
     as_batch_size,
     as_device,
@@ -88,8 +88,8 @@ class SecureOffloadingEnv(EnvBase):
         super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
         self.system = SecureOffloadingSystem(as_scenario(scenario), self.device)
         self.schemes = as_schemes(scheme, self.batch_size)
-        self.diagnostics = switch("diagnostics", diagnostics)
-        self.tells_fading = switch("fading", fading)
+        self.diagnostics = checked(bool, "diagnostics", diagnostics)
+        self.tells_fading = checked(bool, "fading", fading)
         self._always_relay = self._rows_that_fly("relay")
         self._always_jam = self._rows_that_fly("jamming")
         norm_limit = self.system.norm_limit(self.schemes)

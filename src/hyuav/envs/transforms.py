@@ -8,7 +8,7 @@ from torch import Tensor
 from torchrl.data import Composite, Unbounded
 from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
-from hyuav._support.parameters import switch
+from hyuav._support.parameters import checked
 from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.physics.scenario import Scenario
@@ -151,10 +151,10 @@ def make_env(
     Raises:
         InputError: as :class:`SecureOffloadingEnv`.
     """
-    switch("clock", clock)
-    switch("geofence", geofence)
+    checked(bool, "clock", clock)
+    checked(bool, "geofence", geofence)
     env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics, fading)
-    kind = CompiledEnv if switch("compiled", compiled) else TransformedEnv
+    kind = CompiledEnv if checked(bool, "compiled", compiled) else TransformedEnv
     return kind(
         env,
         Compose(

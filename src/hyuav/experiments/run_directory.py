@@ -9,16 +9,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
 from omegaconf import OmegaConf
+from pydantic import Field
 from torch import Tensor
 
 from hyuav._support.durable import create_durably
 from hyuav._support.errors import BusyError, InputError, rejection, require_choice
 from hyuav._support.files import open_regular, read_regular
-from hyuav._support.parameters import mapping, sequence
+from hyuav._support.parameters import checked, mapping
 from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import IDENTITY, parse_rows
 from hyuav.learning.algorithm import AlgorithmParameters
@@ -95,19 +96,12 @@ class RunConfiguration:
         }
 
 
-def _learner(name: str, value: object) -> Learner:
-    if isinstance(value, Learner):
-        return value
-    fields = mapping(name, value)
-    try:
-        return Learner.from_dict(fields)
-    except InputError as error:
-        raise type(error)(f"{name}: {error}") from None
+Learners = Annotated[tuple[Learner, ...], Field(min_length=1, description="a list of learners")]
 
 
 def _learners(values: object, num_slots: int) -> tuple[Learner, ...]:
     """Learners that differ, where those without a horizon of their own have ``num_slots``."""
-    learners: tuple[Learner, ...] = sequence(_learner, "a list of learners")("learners", values)
+    learners: tuple[Learner, ...] = checked(Learners, "learners", values)
     resolved = [
         dataclasses.replace(learner, num_slots=learner.num_slots or num_slots)
         for learner in learners

@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import torch
+from pydantic.dataclasses import dataclass
 from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.collectors import Collector
 
-from hyuav._support.parameters import Parameters, choice, count, optional, parameter
+from hyuav._support.parameters import Count, CountOrZero, Parameters, parameter
 from hyuav._support.randomness import (
     RowStream,
     derived_seed,
@@ -35,7 +35,7 @@ from hyuav.learning.weights import (
     replace_learners,
 )
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SCHEMES
+from hyuav.physics.slot import Scheme
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Learner(Parameters):
     or horizon begin with the same weights and meet the same luck.
     """
 
-    scheme: str = parameter(choice(*SCHEMES), "hybrid")
-    seed: int = parameter(count(0), 0)
-    num_slots: int | None = parameter(optional(count()), None, symbol="T")
+    scheme: Scheme = parameter("hybrid")
+    seed: CountOrZero = parameter(0)
+    num_slots: Count | None = parameter(None, symbol="T")
     """The horizon; the scenario's where it is None."""
 
 

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import torch
 from torch import Tensor
 
+from hyuav._support.parameters import OneOf
 from hyuav.physics import channel, energy, offloading
 from hyuav.physics import motion as flight
 from hyuav.physics import rates as secrecy
@@ -14,6 +15,8 @@ from hyuav.physics.scenario import Scenario
 
 SCHEMES = ("hybrid", "relay", "jamming")
 """Who chooses the helper's mode: the better of both in each slot, or always the same."""
+
+Scheme = Annotated[str, OneOf(*SCHEMES)]
 
 
 class Tasks(NamedTuple):

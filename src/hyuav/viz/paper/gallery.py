@@ -4,12 +4,13 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
 from rich.console import Console
 
 from hyuav._support.errors import InputError
+from hyuav._support.parameters import OneOf
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.comparison.tables import label
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, LABELS, OPTIMA
@@ -210,6 +211,8 @@ FIGURES: dict[str, Callable[[Finished, Path, str], None]] = {
     "animation": _animation,
 }
 """What draws each figure into a directory under a name; the first three are the paper's."""
+
+FigureName = Annotated[str, OneOf(*FIGURES)]
 
 
 def draw(run: RunDirectory, names: Sequence[str] | None, console: Console) -> None:
