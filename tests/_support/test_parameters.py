@@ -137,7 +137,8 @@ def test_text_is_kept_as_it_is_and_not_empty() -> None:
 def test_a_choice_is_one_of_those_given() -> None:
     shape = Annotated[str, OneOf("box", "disc")]
     assert [checked(shape, "field", name) for name in ("box", "disc")] == ["box", "disc"]
-    for other in ("polygon", "", None, 3, ["box"], {}):
+    others: list[Any] = ["polygon", "", None, 3, ["box"], {}]
+    for other in others:
         refused(shape, other, "one of box, disc", InputError)
     with pytest.raises(InputError, match=r"one of box, disc \(did you mean 'disc'\?\)$"):
         checked(shape, "field", "disk")

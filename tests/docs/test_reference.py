@@ -8,7 +8,7 @@ from typing import get_type_hints
 from api import ROOMS, SHARED, modules, pages
 from configuration import accepted, configuration_page, descriptions, recipes_page, table
 from hyuav import Learner, Scenario
-from hyuav._support.parameters import OneOrMore, Text, ZeroOrMore
+from hyuav._support.parameters import OneOrMore, Parameters, Text, ZeroOrMore
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.robust import RobustDDPG
@@ -29,7 +29,7 @@ def rows(text: str) -> list[list[str]]:
 
 def test_every_field_of_scenario_algorithms_and_learners_has_a_row() -> None:
     parts = sections(configuration_page())
-    named = {"scenario": Scenario, "learners": Learner}
+    named: dict[str, type[Parameters]] = {"scenario": Scenario, "learners": Learner}
     named |= {f"algorithm={name}": parameters for name, parameters in ALGORITHMS.items()}
     assert set(parts) == set(named)
     for title, record in named.items():

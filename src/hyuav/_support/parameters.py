@@ -274,7 +274,8 @@ def _in_one_line(error: ValidationError, annotation: Any, value: Any, name: str 
     """
     first = error.errors(include_url=False)[0]
     kind, context = first["type"], first.get("ctx", {})
-    for part in first["loc"]:
+    place: tuple[Any, ...] = first["loc"]
+    for part in place:
         expected: Any = declared(annotation).annotation
         if isinstance(expected, _InOneLine):
             owner, hints = name or expected.__name__.lower(), _hints(expected)

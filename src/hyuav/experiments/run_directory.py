@@ -1,17 +1,16 @@
 """The run directory: configuration, metrics, checkpoints, evaluation and figures of a training."""
 
 import dataclasses
-import fcntl
-import os
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import pandas as pd
+from filelock import FileLock, Timeout
 from omegaconf import OmegaConf
 from pydantic import Field
 from torch import Tensor
@@ -31,6 +30,9 @@ from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.physics.slot import SCHEMES
 
 REPORT_FILE = "report.html"
+
+LOCK_FILE = ".lock"
+"""There while a process trains."""
 
 METRIC_COLUMNS = (
     "episode",
@@ -211,17 +213,17 @@ class RunDirectory:
     def reserved(self) -> Iterator[None]:
         """Let no other process train here meanwhile; a process that is killed reserves nothing.
 
-        Where the file system cannot lock a directory, nobody is kept away.
+        Where the file system cannot lock a file, nobody is kept away.
 
         Raises:
             BusyError: another process trains here.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        directory = os.open(self.path, os.O_RDONLY)
+        file = self.path / LOCK_FILE
+        lock = FileLock(file, timeout=0, fallback_to_soft=False)
         try:
-            fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(directory)
+            lock.acquire()
+        except Timeout:
             accepted = "one in which no other process trains"
             raise BusyError(rejection("run directory", str(self.path), accepted)) from None
         except OSError:
@@ -229,7 +231,10 @@ class RunDirectory:
         try:
             yield
         finally:
-            os.close(directory)
+            if lock.is_locked:
+                with suppress(OSError):  # Windows removes it with the lock
+                    file.unlink()
+                lock.release()
 
     def configuration(self) -> RunConfiguration:
         """What the training was asked to do.
