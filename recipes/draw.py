@@ -13,9 +13,10 @@ from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError
-from hyuav._support.parameters import OneOrMore, Parameters, Text, parameter
+from hyuav._support.parameters import OneOrMore, Parameters, Text, ZeroOrMore, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.experiments.own_algorithms import OwnAlgorithm
 from hyuav.experiments.run_directory import RunDirectory, require_writable
 from hyuav.viz.paper.gallery import FigureName, draw
 
@@ -25,6 +26,8 @@ class Draw(Parameters):
     """Which figures of which run."""
 
     run: Text | None = parameter(None)
+    algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
+    """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
     figures: OneOrMore[FigureName] | None = parameter(None)
     """None for all that the run's files allow."""
 

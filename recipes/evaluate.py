@@ -16,7 +16,15 @@ from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import Count, OneOrMore, Parameters, Text, Threads, parameter
+from hyuav._support.parameters import (
+    Count,
+    OneOrMore,
+    Parameters,
+    Text,
+    Threads,
+    ZeroOrMore,
+    parameter,
+)
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.configuration import Config, recipe, section
 from hyuav.experiments.evaluation import (
@@ -27,6 +35,7 @@ from hyuav.experiments.evaluation import (
 )
 from hyuav.experiments.evaluation_table import print_results
 from hyuav.experiments.experiment import learned_policies, reference_policies
+from hyuav.experiments.own_algorithms import OwnAlgorithm
 from hyuav.experiments.run_directory import RunDirectory, require_writable
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
 from hyuav.viz.html.page import write_run_report
@@ -41,6 +50,8 @@ class Evaluate(Parameters):
     num_slots: Count | None = parameter(None, symbol="T")
     """The horizon, of whose learners the runs must have some; the scenario's where it is None."""
     output: Text | None = parameter(None)
+    algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
+    """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
     device: Text = parameter("cpu")
     threads: Threads = parameter(1)
 

@@ -13,9 +13,10 @@ from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError
-from hyuav._support.parameters import OneOrMore, Parameters, Text, Threads, parameter
+from hyuav._support.parameters import OneOrMore, Parameters, Text, Threads, ZeroOrMore, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.experiments.own_algorithms import OwnAlgorithm
 from hyuav.viz.html.page import write_report
 
 
@@ -25,6 +26,8 @@ class Report(Parameters):
 
     run: OneOrMore[Text] | None = parameter(None)
     """Directories of runs or comparisons, finished or not."""
+    algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
+    """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
     threads: Threads = parameter(1)
 
 

@@ -40,6 +40,7 @@ from hyuav.experiments.experiment import resume, saved_weights, train_or_resume
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.cohort import Learner
+from hyuav.learning.registry import is_reference
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.slot import Scheme
 from hyuav.viz.html.page import write_run_report
@@ -106,7 +107,8 @@ def go_on(path: str, config: Config) -> None:
     Raises:
         InputError: there is none, or something else was asked for beside it.
     """
-    for name in given() - {"resume", "device", "threads"}:
+    named = {"algorithm"} if is_reference(config["algorithm"]["name"]) else set()
+    for name in given() - {"resume", "device", "threads"} - named:
         if name == "hydra.run.dir" or not name.startswith(("logger.", "hydra.")):
             accepted = "nothing beside it but device=, threads= and logger.NAME="
             raise InputError(f"{rejection('resume', path, accepted)}, not {name}")

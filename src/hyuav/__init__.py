@@ -1,7 +1,5 @@
 """Reinforcement learning for UAV-enabled secure offloading with a hybrid relay and jammer."""
 
-import os
-
 import gymnasium
 
 from hyuav._support.errors import InputError, InputTypeError
@@ -9,7 +7,7 @@ from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.envs.transforms import make_env
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.registry import OWN_FILES, register, run_own_files
+from hyuav.learning.registry import register
 from hyuav.learning.robust import RobustDDPG, RobustSAC, RobustTD3
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
@@ -39,5 +37,3 @@ gymnasium.register(
     entry_point="hyuav.envs.gymnasium:SecureOffloadingGymEnv",
     vector_entry_point="hyuav.envs.gymnasium:SecureOffloadingVectorEnv",
 )
-
-run_own_files(os.environ.get(OWN_FILES, ""))  # last: they import from above

@@ -16,7 +16,7 @@ from pydantic import Field
 from torch import Tensor
 
 from hyuav._support.durable import create_durably
-from hyuav._support.errors import BusyError, InputError, rejection, require_choice
+from hyuav._support.errors import BusyError, InputError, rejection
 from hyuav._support.files import open_regular, read_regular
 from hyuav._support.parameters import checked, mapping
 from hyuav._support.yaml_files import read_yaml
@@ -24,7 +24,7 @@ from hyuav.experiments.metrics import IDENTITY, parse_rows
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
-from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.registry import find
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.physics.slot import SCHEMES
@@ -145,8 +145,7 @@ def named_algorithm(values: object) -> tuple[str, AlgorithmParameters]:
     """An algorithm and its name, from its hyperparameters with a ``name``."""
     fields = mapping("algorithm", values)
     name = fields.pop("name", None)
-    require_choice("algorithm", name, ALGORITHMS)
-    return str(name), ALGORITHMS[str(name)].from_dict(fields)
+    return str(name), find(name).from_dict(fields)
 
 
 class RunDirectory:

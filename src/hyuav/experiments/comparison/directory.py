@@ -144,7 +144,7 @@ class ComparisonDirectory:
     def _unsaid(self) -> dict[str, Any]:
         """Entries that older comparisons may not name; what they did not know was off."""
         plain = {
-            f"hyperparameters.{entry}": ALGORITHMS[PLAIN[name]]().to_dict()
+            f"hyperparameters.{entry}": ALGORITHMS[PLAIN.get(name, name)]().to_dict()
             for entry in self.options.entries
             if (name := entry.partition("-")[0]) != PEER
         }

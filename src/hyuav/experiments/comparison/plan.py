@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from hyuav._support.errors import InputError, rejection
+from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.machine import cores, require_installed
 from hyuav._support.parameters import (
     Count,
@@ -27,7 +27,7 @@ from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.registry import ALGORITHMS, PEER
+from hyuav.learning.registry import ALGORITHMS, PEER, find, is_reference, names
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
 from hyuav.physics.scenario import Preset, Scenario
@@ -55,8 +55,7 @@ ENGINES = ("processes", "ray")
 LAYOUT = "layout-"
 """With its seed behind, the name of a random layout's scenario."""
 
-
-Entry = Annotated[str, OneOf(*ENTRIES)]
+Entry = Annotated[Text, Field(description=f"one of {', '.join(ENTRIES)}, FILE.py:CLASS")]
 Piece = Annotated[str, OneOf(*PIECES)]
 
 
@@ -94,6 +93,10 @@ class Compare(Parameters):
     """Directory of the comparison, which may have been begun."""
 
     def __post_init__(self) -> None:
+        for name in self.algorithm:
+            if is_reference(name):
+                find(name)
+            require_choice("algorithm", name, [*names(), PEER])
         for name in ("algorithm", "without", "scenario", "scheme", "num_slots"):
             values = getattr(self, name)
             if len(set(values)) < len(values):
@@ -149,7 +152,7 @@ def parameters_of(entry: str) -> AlgorithmParameters:
     parameters: AlgorithmParameters = ALGORITHMS[name]()
     if not hasattr(parameters, piece):
         return parameters
-    plain = getattr(ALGORITHMS[PLAIN[name]](), piece)
+    plain = getattr(ALGORITHMS[PLAIN.get(name, name)](), piece)
     return type(parameters).from_dict({**parameters.to_dict(), piece: plain})
 
 

@@ -18,7 +18,7 @@ from hyuav.experiments.comparison.directory import Summary
 from hyuav.experiments.comparison.plan import ENTRIES, PIECES, Compare
 from hyuav.experiments.comparison.statistics import learning_curves, performance_profiles
 from hyuav.experiments.comparison.tables import MOST_COLUMNS, label
-from hyuav.learning.registry import PEER
+from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.viz.paper import COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
 
 _OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
@@ -46,7 +46,9 @@ def color(entry: str) -> str:
     piece = entry.partition("-")[2]
     if piece in PIECES:
         return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]]
-    return _UNKNOWN if piece else COLORS.get(entry, _UNKNOWN)
+    own = list(ALGORITHMS).index(entry) if entry in ALGORITHMS else None
+    known = _UNKNOWN if own is None else OKABE_ITO[_OTHERS[own % len(_OTHERS)]]
+    return _UNKNOWN if piece else COLORS.get(entry, known)
 
 
 def dash(entry: str) -> int:
