@@ -1,47 +1,45 @@
 """What a benchmark measures: its parts, who takes part, and the sizes that are tried."""
 
 import dataclasses
-from dataclasses import dataclass
-from typing import Self
+from typing import Annotated, Self
 
 import torch
+from pydantic.dataclasses import dataclass
 
 from benchmarks.worker import LIBRARIES
 from hyuav._support.machine import cores, require_installed
 from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    OneOf,
+    OneOrMore,
     Parameters,
-    choice,
-    count,
-    number,
-    one_or_more,
+    PositiveNumber,
     parameter,
-    switch,
 )
 
 PARTS = ("training", "environment", "job", "references", "scaling")
 PEERS = ("stable_baselines3", "sbx", "cleanrl", "torchrl")
-
-_counts = one_or_more(count(), "whole numbers >= 1")
 
 
 @dataclass(frozen=True)
 class Benchmark(Parameters):
     """How the benchmark is done."""
 
-    parts: tuple[str, ...] = parameter(one_or_more(choice(*PARTS), "parts"), PARTS)
-    peers: tuple[str, ...] = parameter(one_or_more(choice(*PEERS), "libraries"), PEERS)
-    learners: tuple[int, ...] = parameter(_counts, (1, 10))
-    rounds: int = parameter(count(), 3)
-    seconds: float = parameter(number(above=0.0), 10.0, unit="s")
-    batches: tuple[int, ...] = parameter(_counts, tuple(4**power for power in range(9)))
-    episodes: int = parameter(count(), 1000)
-    scaling_learners: tuple[int, ...] = parameter(_counts, (1, 2, 4, 8, 16, 32, 64))
-    cuda_learners: tuple[int, ...] = parameter(_counts, (1, 16, 256, 1024, 4096))
-    ues: tuple[int, ...] = parameter(_counts, (10, 100, 1000))
-    horizons: tuple[int, ...] = parameter(_counts, (10, 20, 50, 100))
-    compile: str = parameter(choice("auto", "always", "never"), "auto")
-    quick: bool = parameter(switch, False)
-    seed: int = parameter(count(0), 0)
+    parts: OneOrMore[Annotated[str, OneOf(*PARTS)]] = parameter(PARTS)
+    peers: OneOrMore[Annotated[str, OneOf(*PEERS)]] = parameter(PEERS)
+    learners: OneOrMore[Count] = parameter((1, 10))
+    rounds: Count = parameter(3)
+    seconds: PositiveNumber = parameter(10.0, unit="s")
+    batches: OneOrMore[Count] = parameter(tuple(4**power for power in range(9)))
+    episodes: Count = parameter(1000)
+    scaling_learners: OneOrMore[Count] = parameter((1, 2, 4, 8, 16, 32, 64))
+    cuda_learners: OneOrMore[Count] = parameter((1, 16, 256, 1024, 4096))
+    ues: OneOrMore[Count] = parameter((10, 100, 1000))
+    horizons: OneOrMore[Count] = parameter((10, 20, 50, 100))
+    compile: Annotated[str, OneOf("auto", "always", "never")] = parameter("auto")
+    quick: bool = parameter(False)
+    seed: CountOrZero = parameter(0)
 
     def shortened(self) -> Self:
         """As it is, or where it is to be quick a small part of each part."""

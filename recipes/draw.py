@@ -8,28 +8,29 @@ import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to loa
 
 # isort: split
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError
-from hyuav._support.parameters import Parameters, choice, one_or_more, optional, parameter, text
+from hyuav._support.parameters import OneOrMore, Parameters, Text, ZeroOrMore, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.experiments.own_algorithms import OwnAlgorithm
 from hyuav.experiments.run_directory import RunDirectory, require_writable
-from hyuav.viz.paper.gallery import FIGURES, draw
+from hyuav.viz.paper.gallery import FigureName, draw
 
 
 @dataclass(frozen=True)
 class Draw(Parameters):
     """Which figures of which run."""
 
-    run: str | None = parameter(optional(text), None)
-    figures: tuple[str, ...] | None = parameter(
-        optional(one_or_more(choice(*FIGURES), f"a list of {', '.join(FIGURES)}")), None
-    )
+    run: Text | None = parameter(None)
+    algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
+    """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
+    figures: OneOrMore[FigureName] | None = parameter(None)
     """None for all that the run's files allow."""
 
 

@@ -11,21 +11,21 @@ import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to loa
 
 import dataclasses
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import (
+    Count,
+    OneOrMore,
     Parameters,
-    count,
-    one_or_more,
-    optional,
+    Text,
+    Threads,
+    ZeroOrMore,
     parameter,
-    text,
-    thread_count,
 )
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.configuration import Config, recipe, section
@@ -36,6 +36,7 @@ from hyuav.experiments.evaluation import (
     evaluate,
 )
 from hyuav.experiments.evaluation_table import print_results
+from hyuav.experiments.own_algorithms import OwnAlgorithm
 from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunDirectory, require_writable
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
@@ -47,12 +48,14 @@ from hyuav.viz.paper.flights import save_flight_map
 class Evaluate(Parameters):
     """What to evaluate and where to."""
 
-    run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "run directories")), None)
-    num_slots: int | None = parameter(optional(count()), None, symbol="T")
+    run: OneOrMore[Text] | None = parameter(None)
+    num_slots: Count | None = parameter(None, symbol="T")
     """The horizon, of whose learners the runs must have some; the scenario's where it is None."""
-    output: str | None = parameter(optional(text), None)
-    device: str = parameter(text, "cpu")
-    threads: int = parameter(thread_count, 1)
+    output: Text | None = parameter(None)
+    algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
+    """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
+    device: Text = parameter("cpu")
+    threads: Threads = parameter(1)
 
 
 @recipe(

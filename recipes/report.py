@@ -8,23 +8,17 @@ import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to loa
 
 # isort: split
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError
-from hyuav._support.parameters import (
-    Parameters,
-    one_or_more,
-    optional,
-    parameter,
-    text,
-    thread_count,
-)
+from hyuav._support.parameters import OneOrMore, Parameters, Text, Threads, ZeroOrMore, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.experiments.own_algorithms import OwnAlgorithm
 from hyuav.viz.html.page import write_report
 
 
@@ -32,9 +26,11 @@ from hyuav.viz.html.page import write_report
 class Report(Parameters):
     """What to report on."""
 
-    run: tuple[str, ...] | None = parameter(optional(one_or_more(text, "directories")), None)
+    run: OneOrMore[Text] | None = parameter(None)
     """Directories of runs or comparisons, finished or not."""
-    threads: int = parameter(thread_count, 1)
+    algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
+    """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
+    threads: Threads = parameter(1)
 
 
 @recipe("report", Report, groups={}, sections={}, run_directory=".")

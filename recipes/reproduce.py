@@ -19,21 +19,23 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 import torch
+from pydantic import Field
+from pydantic.dataclasses import dataclass as pydantic_dataclass
 from rich.console import Console
 from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    OneOrMore,
     Parameters,
-    choice,
-    count,
-    one_or_more,
-    optional,
+    Text,
+    Threads,
     parameter,
-    text,
-    thread_count,
 )
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
@@ -49,38 +51,34 @@ from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.offloading import MODE_RULES
-from hyuav.physics.scenario import PRESETS, Scenario
+from hyuav.physics.scenario import PRESETS, Preset, Scenario
 from hyuav.references.optimum import require_resolution
 from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
 from hyuav.viz.html.page import write_report
-from hyuav.viz.paper.gallery import FIGURES, draw
+from hyuav.viz.paper.gallery import FigureName, draw
+
+Seeds = Annotated[int, Field(ge=1, le=10_000)]
 
 
-@dataclass(frozen=True)
+@pydantic_dataclass(frozen=True)
 class Reproduce(Parameters):
     """How the main job is done."""
 
-    seeds: int = parameter(count(1, 10_000), 1)
-    further_seeds: int | None = parameter(optional(count(1, 10_000)), None)
+    seeds: Seeds = parameter(1)
+    further_seeds: Seeds | None = parameter(None)
     """Over other horizons and presets than the scenario's own; None for as many as ``seeds``."""
-    num_slots: tuple[int, ...] | None = parameter(
-        optional(one_or_more(count(), "numbers of slots")), None, symbol="T"
-    )
+    num_slots: OneOrMore[Count] | None = parameter(None, symbol="T")
     """Horizons to train and evaluate besides the scenario's own, as for Fig. 4."""
-    also: tuple[str, ...] | None = parameter(
-        optional(one_or_more(choice(*PRESETS), f"a list of {', '.join(PRESETS)}")), None
-    )
+    also: OneOrMore[Preset] | None = parameter(None)
     """Presets whose UEs are flown over too, all else being as in the scenario, as for Fig. 3."""
-    figures: tuple[str, ...] | None = parameter(
-        optional(one_or_more(choice(*FIGURES), f"a list of {', '.join(FIGURES)}")), None
-    )
+    figures: OneOrMore[FigureName] | None = parameter(None)
     """To draw; None for all that these settings allow."""
-    candidates: int = parameter(count(1, 1000), 5)
+    candidates: Annotated[int, Field(ge=1, le=1000)] = parameter(5)
     """Of each scheme's initial weights, where it is trained as in the paper."""
-    candidate_episodes: int = parameter(count(), 50)
-    seed: int = parameter(count(0), 0)
-    device: str = parameter(text, "cpu")
-    threads: int = parameter(thread_count, 1)
+    candidate_episodes: Count = parameter(50)
+    seed: CountOrZero = parameter(0)
+    device: Text = parameter("cpu")
+    threads: Threads = parameter(1)
 
 
 @recipe(

@@ -9,23 +9,24 @@ import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to loa
 
 # isort: split
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import torch
+from pydantic import Field
+from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    OneOrMore,
     Parameters,
-    choice,
-    count,
+    Text,
+    Threads,
     mapping,
-    one_or_more,
-    optional,
     parameter,
-    text,
-    thread_count,
 )
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import (
@@ -42,8 +43,9 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train_or_resume
 from hyuav.learning.cohort import Learner
+from hyuav.learning.registry import is_reference
 from hyuav.learning.training import TrainingParameters
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.offloading import ModeRuleName
 from hyuav.viz.html.page import write_report
 
 
@@ -51,17 +53,15 @@ from hyuav.viz.html.page import write_report
 class Train(Parameters):
     """What to train, besides the scenario, the algorithm and its training."""
 
-    scheme: tuple[str, ...] = parameter(one_or_more(choice(*MODE_RULES), "schemes"), ("hybrid",))
-    num_slots: tuple[int, ...] | None = parameter(
-        optional(one_or_more(count(), "numbers of slots")), None
-    )
-    learners: int = parameter(count(1, 100_000), 1)
+    scheme: OneOrMore[ModeRuleName] = parameter(("hybrid",))
+    num_slots: OneOrMore[Count] | None = parameter(None)
+    learners: Annotated[int, Field(ge=1, le=100_000)] = parameter(1)
     """Of each scheme and horizon; their seeds follow ``seed``."""
-    seed: int = parameter(count(0), 0)
-    device: str = parameter(text, "cpu")
-    threads: int = parameter(thread_count, 1)
-    warm_start: str | None = parameter(optional(text), None)
-    resume: str | None = parameter(optional(text), None)
+    seed: CountOrZero = parameter(0)
+    device: Text = parameter("cpu")
+    threads: Threads = parameter(1)
+    warm_start: Text | None = parameter(None)
+    resume: Text | None = parameter(None)
     """Directory of an interrupted training, with which to go on as it was configured."""
 
 
@@ -110,7 +110,8 @@ def go_on(path: str, config: Config) -> None:
     Raises:
         InputError: there is none, or something else was asked for beside it.
     """
-    for name in given() - {"resume", "device", "threads"}:
+    named = {"algorithm"} if is_reference(config["algorithm"]["name"]) else set()
+    for name in given() - {"resume", "device", "threads"} - named:
         if name == "hydra.run.dir" or not name.startswith(("logger.", "hydra.")):
             accepted = "nothing beside it but device=, threads= and logger.NAME="
             raise InputError(f"{rejection('resume', path, accepted)}, not {name}")

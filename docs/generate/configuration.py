@@ -8,16 +8,18 @@ import re
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
+from annotated_types import MinLen
 from hydra.core.config_store import ConfigStore
 from omegaconf import OmegaConf
+from pydantic.fields import FieldInfo
 
-from hyuav._support.errors import InputError
-from hyuav._support.parameters import Converter, Parameters
+from hyuav._support.parameters import OrOne, Parameters, declared
+from hyuav._support.parameters import accepted as words
 from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS, BUILT_IN
 from hyuav.physics.scenario import PRESETS, Scenario
@@ -76,13 +78,14 @@ def table(parameters: type[Parameters], defaults: dict[str, Any] | None = None) 
         defaults: where they differ from the record's own.
     """
     documented = descriptions(parameters)
+    annotations = get_type_hints(parameters, include_extras=True)
     rows = [("name", "default", "accepted", "unit", "symbol", "meaning")]
     for field in fields(parameters):
         own = field.default if defaults is None else defaults[field.name]
         cells = (
             f"`{field.name}`",
             "required" if own is MISSING else f"`{_shown(own)}`",
-            accepted(field),
+            accepted(annotations[field.name]),
             field.metadata["unit"],
             _symbol(field.metadata["symbol"]),
             documented.get(field.name, ""),
@@ -93,16 +96,16 @@ def table(parameters: type[Parameters], defaults: dict[str, Any] | None = None) 
     return "\n".join([lines[0], "|---" * len(filled) + "|", *lines[1:]])
 
 
-def accepted(field: Field[Any]) -> str:
-    """What a field takes, as its own check words it when it is given something else."""
-    convert: Converter = field.metadata["convert"]
-    one, several = _refusal(convert, object()), _refusal(convert, [])
-    text = one or "anything"
-    if several is None:
-        text += ", or a list of any length"
-    elif several != one:
-        text += ", or a list"
-    return text if _refusal(convert, None) else f"{text}, or null"
+def accepted(annotation: Any) -> str:
+    """What a field of an annotated type takes, lists and null included."""
+    info = declared(annotation)
+    text = words(annotation)
+    if OrOne in info.metadata:
+        text = f"{words(get_args(info.annotation)[0])}, or a list"
+        if not any(isinstance(check, MinLen) for check in info.metadata):
+            text += " of any length"
+    optional = type(None) in get_args(FieldInfo.from_annotation(annotation).annotation)
+    return f"{text}, or null" if optional else text
 
 
 def descriptions(parameters: type[Parameters]) -> dict[str, str]:
@@ -127,15 +130,6 @@ def _documented(body: list[ast.stmt]) -> Iterator[tuple[str, str]]:
 def _link(role: re.Match[str]) -> str:
     path = role[1]
     return f"[`{path}`][{path}]" if path.startswith("hyuav.") else f"`{path}`"
-
-
-def _refusal(convert: Converter, value: object) -> str | None:
-    """What a check says it expects instead of a value; None where it takes the value."""
-    try:
-        convert("", value)
-    except InputError as error:
-        return str(error).partition(": expected ")[2].partition(" (did you mean")[0]
-    return None
 
 
 def _shown(value: object) -> str:

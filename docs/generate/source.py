@@ -20,13 +20,18 @@ class Roles(griffe.Extension):
 
 
 class Defaults(griffe.Extension):
-    """Show ``parameter(check, default)`` as the default that it declares."""
+    """Show ``parameter(default)`` as the default, and pydantic's dataclasses as dataclasses."""
+
+    def on_alias_instance(self, *, alias: griffe.Alias, **_: Any) -> None:
+        """Let the decorator be the one whose fields griffe knows to be parameters."""
+        if alias.target_path == "pydantic.dataclasses.dataclass":
+            alias.target_path = "dataclasses.dataclass"
 
     def on_attribute_instance(self, *, attr: griffe.Attribute, **_: Any) -> None:
         """Put the default in the place of the declaration."""
         declared = attr.value
         if isinstance(declared, griffe.ExprCall) and str(declared.function) == "parameter":
-            default = list(declared.arguments)[1:]
+            default = list(declared.arguments)
             by_name = not default or isinstance(default[0], griffe.ExprKeyword)
             attr.value = None if by_name else default[0]
 

@@ -1,29 +1,33 @@
-"""Records of parameters: the converters of their fields, plain values, and files."""
+"""Records of parameters: what their fields accept, plain values, and files."""
 
 import dataclasses
 import math
 import re
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pytest
 import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pydantic import Field
+from pydantic.dataclasses import dataclass
 
 import reference
 from hyuav import InputError, InputTypeError, Scenario
 from hyuav._support.parameters import (
-    Converter,
-    choice,
-    count,
-    increasing_pair,
-    number,
-    one_or_more,
-    optional,
-    sequence,
-    text,
+    Count,
+    NonNegativeNumber,
+    Number,
+    OneOf,
+    OneOrMore,
+    Parameters,
+    PositiveNumber,
+    Text,
+    ZeroOrMore,
+    checked,
+    parameter,
 )
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
@@ -31,33 +35,39 @@ FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
 BUDGETS = ("ue_energy_budget", "edge_energy_budget", "helper_energy_budget")
 
 
-def refused(convert: Converter, value: Any, accepted: str, error: type[Exception]) -> None:
-    """The converter answers ``value`` in one line with just this error."""
+def refused(annotation: Any, value: Any, accepted: str, error: type[Exception]) -> None:
+    """A field of such a type answers ``value`` in one line with just this error."""
     with pytest.raises(
         InputError, match=rf"^field = .*: expected {re.escape(accepted)}$"
     ) as caught:
-        convert("field", value)
+        checked(annotation, "field", value)
     assert caught.type is error
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("convert", "inside", "outside", "accepted"),
+    ("annotation", "inside", "outside", "accepted"),
     [
-        (number(), [-1e300, 0, 1e300], [math.nan, math.inf, -math.inf], "a finite number"),
-        (number(2.0), [2, 1e300], [1.999, -3, math.inf], "a finite number >= 2"),
-        (number(above=0.0), [5e-324, 7], [0.0, -0.0, -1, math.inf], "a finite number > 0"),
-        (number(-1.0, 3.0), [-1, 0.5, 3], [-1.001, 3.001, math.nan], "a number in [-1, 3]"),
+        (Number, [-1e300, 0, 1e300], [math.nan, math.inf, -math.inf], "a finite number"),
+        (
+            Annotated[float, Field(ge=2.0)],
+            *([2, 1e300], [1.999, -3, math.inf], "a finite number >= 2"),
+        ),
+        (PositiveNumber, [5e-324, 7], [0.0, -0.0, -1, math.inf], "a finite number > 0"),
+        (
+            Annotated[float, Field(ge=-1.0, le=3.0)],
+            *([-1, 0.5, 3], [-1.001, 3.001, math.nan], "a number in [-1, 3]"),
+        ),
     ],
 )
 def test_a_number_lies_within_its_bounds(
-    convert: Converter, inside: list[float], outside: list[float], accepted: str
+    annotation: Any, inside: list[float], outside: list[float], accepted: str
 ) -> None:
     for value in inside:
-        assert convert("field", value) == value
-        assert type(convert("field", value)) is float
+        assert checked(annotation, "field", value) == value
+        assert type(checked(annotation, "field", value)) is float
     for value in outside:
-        refused(convert, value, accepted, InputError)
+        refused(annotation, value, accepted, InputError)
 
 
 @pytest.mark.parametrize(
@@ -65,102 +75,165 @@ def test_a_number_lies_within_its_bounds(
     [
         *(1j, 1 + 0j, np.complex64(1), np.complex128(1j), np.array(1j), torch.tensor(1j)),
         *(True, False, np.True_, np.False_, "1", b"1", None, [1.0], 10**400),
+        *(np.array([1.0]), torch.ones(1, 1), torch.empty((), device="meta"), {}, object()),
     ],
 )
 def test_complex_numbers_truth_values_and_text_are_no_numbers(value: Any) -> None:
-    refused(number(), value, "a finite number", InputTypeError)
+    refused(Number, value, "a finite number", InputTypeError)
 
 
 @pytest.mark.parametrize("low", [-3, 0, 1, 7])
 def test_a_count_starts_where_it_is_told(low: int) -> None:
+    annotation = Annotated[int, Field(ge=low)]
     for value in (low, low + 1, np.int64(low), torch.tensor(low)):
-        assert count(low)("field", value) == int(value)
-        assert type(count(low)("field", value)) is int
-    refused(count(low), low - 1, f"a whole number >= {low}", InputError)
+        assert checked(annotation, "field", value) == int(value)
+        assert type(checked(annotation, "field", value)) is int
+    refused(annotation, low - 1, f"a whole number >= {low}", InputError)
     for other in (float(low), True, np.True_, 1j, str(low), None):
-        refused(count(low), other, f"a whole number >= {low}", InputTypeError)
+        refused(annotation, other, f"a whole number >= {low}", InputTypeError)
 
 
 @pytest.mark.parametrize("digits", [16, 400, 5000])
 def test_a_count_fits_what_counts_it(digits: int) -> None:
     value = int("f" * digits, 16)  # of the longest, Python writes no decimal digits
-    refused(count(), value, f"a whole number <= {2**63 - 1}", InputError)
-    refused(count(1, 3), 4, "a whole number <= 3", InputError)
+    refused(Count, value, f"a whole number <= {2**63 - 1}", InputError)
+    refused(Annotated[int, Field(ge=1, le=3)], 4, "a whole number <= 3", InputError)
 
 
 def test_what_is_optional_may_be_none_and_is_checked_otherwise() -> None:
-    assert optional(count())("field", None) is None
-    assert optional(count())("field", 3) == 3
-    refused(optional(count()), 0, "a whole number >= 1", InputError)
-    refused(optional(text), 3, "text", InputTypeError)
+    assert checked(Count | None, "field", None) is None
+    assert checked(Count | None, "field", 3) == 3
+    refused(Count | None, 0, "a whole number >= 1", InputError)
+    refused(Text | None, 3, "text that is not empty", InputTypeError)
 
 
 @pytest.mark.parametrize(
-    ("value", "kept"), [(3, (3,)), ([3], (3,)), ([3, 1], (3, 1)), ((2, 2, 5), (2, 2, 5))]
+    ("value", "kept"),
+    [(3, (3,)), ([3], (3,)), ([3, 1], (3, 1)), ((2, 2, 5), (2, 2, 5)), (np.int64(3), (3,))],
 )
 def test_one_value_or_a_list_of_them_is_kept_as_a_tuple(value: Any, kept: tuple[int, ...]) -> None:
-    assert one_or_more(count(), "whole numbers")("field", value) == kept
+    for annotation in (OneOrMore[Count], ZeroOrMore[Count]):
+        assert checked(annotation, "field", value) == kept
 
 
 def test_of_one_or_more_values_every_one_is_checked() -> None:
-    convert = one_or_more(count(), "whole numbers")
-    refused(convert, [], "whole numbers", InputError)
-    with pytest.raises(InputTypeError, match=r"^field = 'two': expected a whole number >= 1$"):
-        convert("field", "two")
-    with pytest.raises(InputError, match=r"^field\[1\] = 0: expected a whole number >= 1$"):
-        convert("field", [1, 0])
+    refused(OneOrMore[Count], [], "a list of a whole number >= 1", InputError)
+    assert checked(ZeroOrMore[Count], "field", []) == ()
+    for annotation in (OneOrMore[Count], ZeroOrMore[Count]):
+        refused(annotation, "two", "a whole number >= 1", InputTypeError)
+        with pytest.raises(InputError, match=r"^field\[1\] = 0: expected a whole number >= 1$"):
+            checked(annotation, "field", [1, 0])
 
 
 def test_text_is_kept_as_it_is_and_not_empty() -> None:
-    assert text("field", " a b ") == " a b "
+    for value in (" a b ", "\ud800", "\x1b[2J"):
+        assert checked(Text, "field", value) == value
     for empty in ("", "  ", "\n\t"):
-        refused(text, empty, "text that is not empty", InputError)
+        refused(Text, empty, "text that is not empty", InputError)
     for other in (None, 3, b"a", ["a"]):
-        refused(text, other, "text", InputTypeError)
+        refused(Text, other, "text that is not empty", InputTypeError)
 
 
 def test_a_choice_is_one_of_those_given() -> None:
-    convert = choice("box", "disc")
-    assert [convert("field", name) for name in ("box", "disc")] == ["box", "disc"]
-    for other in ("polygon", "", None, 3):
-        refused(convert, other, "one of box, disc", InputError)
+    shape = Annotated[str, OneOf("box", "disc")]
+    assert [checked(shape, "field", name) for name in ("box", "disc")] == ["box", "disc"]
+    others: list[Any] = ["polygon", "", None, 3, ["box"], {}]
+    for other in others:
+        refused(shape, other, "one of box, disc", InputError)
     with pytest.raises(InputError, match=r"one of box, disc \(did you mean 'disc'\?\)$"):
-        convert("field", "disk")
+        checked(shape, "field", "disk")
 
 
 @pytest.mark.parametrize("value", [[1, 2], (1, 2), np.array([1, 2]), torch.tensor([1.0, 2.0])])
 def test_a_sequence_of_any_kind_is_kept_as_a_tuple(value: Any) -> None:
-    for convert in (sequence(number(), "numbers"), sequence(number(), "numbers", length=2)):
-        kept = convert("field", value)
+    for annotation in (tuple[Number, ...], tuple[Number, Number]):
+        kept = checked(annotation, "field", value)
         assert kept == (1.0, 2.0)
         assert [type(item) for item in kept] == [float, float]
 
 
 def test_a_sequence_has_its_length_and_checks_every_element() -> None:
-    pair = sequence(number(0.0), "two numbers", length=2)
+    pair = Annotated[tuple[NonNegativeNumber, NonNegativeNumber], Field(description="a pair")]
     for items in ([], [1], [1, 2, 3], torch.zeros(0)):
-        refused(pair, items, "two numbers", InputError)
-    refused(sequence(number(), "numbers"), (), "numbers", InputError)
+        refused(pair, items, "a pair", InputError)
     for other in (None, 3, "12", {1, 2}, {1: 2}, range(2), np.array(3.0)):
-        refused(pair, other, "two numbers", InputTypeError)
+        refused(pair, other, "a pair", InputTypeError)
     with pytest.raises(InputError, match=r"^field\[1\] = -1: expected a finite number >= 0$"):
-        pair("field", [0, -1])
+        checked(pair, "field", [0, -1])
     with pytest.raises(InputTypeError, match=r"^field\[1\]\[0\] = 'a': expected a finite number$"):
-        sequence(sequence(number(), "numbers"), "lists")("field", [[1], ["a"]])
+        checked(tuple[tuple[Number, ...], ...], "field", [[1], ["a"]])
 
 
-def test_an_increasing_pair_is_ordered_and_not_below_its_bound() -> None:
-    convert = increasing_pair(2.0)
-    assert convert("field", [2, 3.5]) == (2.0, 3.5)
-    assert convert("field", np.array([4, 4])) == (4.0, 4.0)
-    accepted = "two numbers (low, high) with 2 <= low <= high"
-    for wrong in ([4, 3], [], [3], [3, 4, 5]):
-        refused(convert, wrong, accepted, InputError)
-    refused(convert, 3.0, accepted, InputTypeError)
-    with pytest.raises(InputError, match=r"^field\[0\] = 1: expected a finite number >= 2$"):
-        convert("field", [1, 3])
-    with pytest.raises(InputTypeError, match=r"^field\[1\] = None"):
-        convert("field", [3, None])
+def test_a_list_within_itself_is_refused() -> None:
+    endless: list[Any] = []
+    endless.append(endless)
+    with pytest.raises(InputTypeError, match=r"^field(\[0\])* = .*: expected"):
+        checked(tuple[tuple[Number, ...], ...], "field", endless)
+
+
+@dataclass(frozen=True)
+class Engine(Parameters):
+    """A record within another."""
+
+    power: PositiveNumber = parameter(2.0)
+    gears: tuple[Count, ...] = parameter((1, 2))
+
+
+@dataclass(frozen=True)
+class Vehicle(Parameters):
+    """A record with another."""
+
+    engine: Engine = parameter(Engine())
+    spare: Engine | None = parameter(None)
+
+    def __post_init__(self) -> None:
+        if self.engine.power > 100.0:
+            raise InputError("engine.power = too much: expected less")
+
+
+def test_a_record_within_another_is_made_of_names_with_values() -> None:
+    vehicle = Vehicle.from_dict({"engine": {"gears": [3]}, "spare": {"power": 1}})
+    assert vehicle == Vehicle(Engine(gears=(3,)), Engine(1.0))
+    assert vehicle.to_dict() == {
+        "engine": {"power": 2.0, "gears": [3]},
+        "spare": {"power": 1.0, "gears": [1, 2]},
+    }
+    assert Vehicle.from_dict(vehicle.to_dict()) == vehicle
+    assert Vehicle.from_dict(Vehicle().to_dict()) == Vehicle()
+
+
+@pytest.mark.parametrize(
+    ("values", "line"),
+    [
+        ({"engine": {"power": 0}}, "engine.power = 0: expected a finite number > 0"),
+        ({"spare": {"gears": [1, 0]}}, "spare.gears[1] = 0: expected a whole number >= 1"),
+        ({"engine": {"powr": 1}}, "engine: unknown field 'powr': did you mean 'power'?"),
+        ({"engine": 3}, "engine = 3: expected names with values"),
+        ({"engine": {"power": 200.0}}, "engine.power = too much: expected less"),
+        ({"motor": 3}, "vehicle: unknown field 'motor': one of engine, spare"),
+    ],
+)
+def test_a_field_of_a_record_within_another_is_named(values: dict[str, Any], line: str) -> None:
+    with pytest.raises(InputError, match=f"^{re.escape(line)}$"):
+        Vehicle.from_dict(values)
+    with pytest.raises(InputError, match=f"^{re.escape(line)}$"):
+        Vehicle(**values)
+
+
+def test_what_stands_in_the_place_of_a_field_has_its_name() -> None:
+    with pytest.raises(InputError, match=r"^power = -1: expected a finite number > 0$"):
+        Engine(-1)
+    with pytest.raises(InputTypeError, match=r"^engine: unexpected positional argument: 2$"):
+        Engine(1.0, (1,), 3)  # type: ignore[call-arg]
+
+
+def test_a_record_that_nothing_would_check_is_no_record() -> None:
+    @dataclasses.dataclass(frozen=True)
+    class Unchecked(Engine):
+        seats: Count = parameter(4)
+
+    with pytest.raises(TypeError, match=r"^Unchecked is to be a dataclass of pydantic"):
+        Unchecked(seats=0)
 
 
 @given(reference.scenarios())

@@ -3,10 +3,12 @@
 import dataclasses
 import re
 from pathlib import Path
+from typing import get_type_hints
 
 from api import ROOMS, SHARED, modules, pages
 from configuration import accepted, configuration_page, descriptions, recipes_page, table
 from hyuav import Learner, Scenario
+from hyuav._support.parameters import OneOrMore, Parameters, Text, ZeroOrMore
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.robust import RobustDDPG
@@ -27,7 +29,7 @@ def rows(text: str) -> list[list[str]]:
 
 def test_every_field_of_scenario_algorithms_and_learners_has_a_row() -> None:
     parts = sections(configuration_page())
-    named = {"scenario": Scenario, "learners": Learner}
+    named: dict[str, type[Parameters]] = {"scenario": Scenario, "learners": Learner}
     named |= {f"algorithm={name}": parameters for name, parameters in ALGORITHMS.items()}
     assert set(parts) == set(named)
     for title, record in named.items():
@@ -62,11 +64,14 @@ def test_a_row_gives_default_check_unit_symbol_and_meaning() -> None:
 
 
 def test_what_is_accepted_is_what_the_check_says() -> None:
-    fields = {field.name: field for field in dataclasses.fields(Learner)}
+    fields = get_type_hints(Learner, include_extras=True)
     assert accepted(fields["scheme"]) == "one of hybrid, relay, jamming"
     assert accepted(fields["num_slots"]) == "a whole number >= 1, or null"
-    sizes = {field.name: field for field in dataclasses.fields(DDPG)}["hidden_sizes"]
+    sizes = get_type_hints(DDPG, include_extras=True)["hidden_sizes"]
     assert accepted(sizes) == "the sizes of at least one hidden layer"
+    names = ZeroOrMore[Text]
+    assert accepted(names) == "text that is not empty, or a list of any length"
+    assert accepted(OneOrMore[Text] | None) == "text that is not empty, or a list, or null"
 
 
 def test_what_the_source_says_of_a_field_is_found_in_base_classes_too() -> None:

@@ -1,11 +1,14 @@
 """A training that is interrupted, or whose files are damaged, and goes on."""
 
 import dataclasses
+import errno
 import io
 import math
 import os
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +20,7 @@ from rich.console import Console
 from faults import small_disk
 from hyuav import InputError
 from hyuav._support.errors import Halted
-from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.run_directory import LOCK_FILE, RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import first_checkpoint
 from hyuav.experiments.train import resume, train, train_or_resume
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
@@ -305,6 +308,32 @@ def test_two_processes_do_not_train_in_one_directory(run: RunDirectory) -> None:
         pytest.raises(InputError, match="expected one in which no other process trains"),
     ):
         resume(run.path, OFF, SILENT)
+    assert not (run.path / LOCK_FILE).exists()
+
+
+def test_a_killed_process_reserves_nothing(run: RunDirectory) -> None:
+    reserving = (
+        "import os, sys\n"
+        "from hyuav.experiments.run_directory import RunDirectory\n"
+        "with RunDirectory(sys.argv[1]).reserved():\n"
+        "    os.kill(os.getpid(), 9)\n"
+    )
+    subprocess.run([sys.executable, "-c", reserving, str(run.path)], check=False)
+    assert (run.path / LOCK_FILE).exists()
+    with run.reserved():
+        pass
+
+
+@pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOLCK])
+def test_where_nothing_can_be_locked_nobody_is_kept_away(
+    run: RunDirectory, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    with run.reserved(), run.reserved():
+        assert run.exists
 
 
 def test_the_same_request_goes_on_and_another_is_refused(run: RunDirectory, unbroken: Path) -> None:

@@ -11,7 +11,7 @@ from omegaconf import OmegaConf
 
 from hostile import CASES, TRIED, attempt, fuzz, mutated, texts
 from hyuav import InputError, Scenario
-from hyuav._support.parameters import DEEPEST_YAML, LARGEST_YAML, read_yaml
+from hyuav._support.yaml_files import DEEPEST_YAML, LARGEST_YAML, read_yaml
 from hyuav.viz.data.configuration import differences
 from hyuav.viz.data.index import RunIndex
 from hyuav.viz.data.reading import readable_config

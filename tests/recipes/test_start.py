@@ -88,14 +88,13 @@ def test_workers_that_are_still_loading_say_nothing(tmp_path: Path) -> None:
 
 def test_an_algorithm_of_ones_own_that_is_missing_is_told_in_one_line(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, str(RECIPES[0])],
+        [sys.executable, str(RECIPES[0].with_name("train.py")), "algorithm=own.py:Own"],
         cwd=tmp_path,
-        env={**os.environ, "HYUAV_ALGORITHMS": "own.py"},
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.stderr == "error: HYUAV_ALGORITHMS = 'own.py': expected a Python file\n"
+    assert done.stderr == "error: algorithm = 'own.py': expected a Python file\n"
     assert done.returncode == 2
 
 

@@ -69,6 +69,12 @@ def rejection(name: str, value: object, accepted: str) -> str:
     return f"{name} = {brief(value)}: expected {accepted}"
 
 
+def did_you_mean(value: object, choices: Iterable[str]) -> str:
+    """A hint at the most similar choice, to be put behind a line; empty if there is none."""
+    similar = difflib.get_close_matches(value, choices, n=1) if isinstance(value, str) else []
+    return f" (did you mean {similar[0]!r}?)" if similar else ""
+
+
 def require_choice(name: str, value: object, choices: Iterable[str]) -> None:
     """Accept ``value`` only where it is one of ``choices``.
 
@@ -76,8 +82,6 @@ def require_choice(name: str, value: object, choices: Iterable[str]) -> None:
         InputError: naming the choices, the most similar one first if there is one.
     """
     choices = list(choices)
-    if isinstance(value, str) and value in choices:
-        return
-    similar = difflib.get_close_matches(value, choices, n=1) if isinstance(value, str) else []
-    hint = f" (did you mean {similar[0]!r}?)" if similar else ""
-    raise InputError(rejection(name, value, f"one of {', '.join(choices)}") + hint)
+    if not isinstance(value, str) or value not in choices:
+        hint = did_you_mean(value, choices)
+        raise InputError(rejection(name, value, f"one of {', '.join(choices)}{hint}"))

@@ -1,187 +1,136 @@
-"""Immutable records of parameters that check themselves and speak in one line."""
+"""Immutable records of parameters: dataclasses of pydantic, answered in one line."""
 
 import dataclasses
-import difflib
-import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from io import StringIO
+import functools
+import typing
+from abc import ABCMeta
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
-import numpy as np
-import yaml
 from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
-from yaml import YAMLError
-
-from hyuav._support.errors import (
-    InputError,
-    InputTypeError,
-    brief,
-    one_line,
-    rejection,
-    require_choice,
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    TypeAdapter,
+    ValidationError,
 )
+from pydantic.dataclasses import dataclass, is_pydantic_dataclass
+from pydantic.fields import FieldInfo
 
-YAML_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""Knows plain values alone; deep nesting would crash the fast one, were it not looked for first."""
+from hyuav._support.errors import InputError, InputTypeError, brief, did_you_mean, rejection
+from hyuav._support.yaml_files import read_yaml
 
-LARGEST_YAML = 2**22
-"""Bytes of a file that is read; the positions of a hundred thousand UEs take fewer."""
-
-LONGEST_YAML = 3000
-"""Characters of a value; Python writes no number with many more digits."""
-
-DEEPEST_YAML = 20
-"""Lists and mappings within each other; configurations have five."""
+LARGEST_COUNT = 2**63 - 1
+"""What an int64 holds."""
 
 MOST_THREADS = 1024
 """More than any machine has use for, and few enough to be started."""
 
-Converter = Callable[[str, Any], Any]
-"""Takes a field's name and a value; returns the value as it is kept, or raises InputError."""
+DEEPEST = 3
+"""Lists and mappings within each other; positions are two deep."""
+
+SCALARS = frozenset((bool, float, int, str, type(None)))
+"""Python's own."""
+
+STRICT = ConfigDict(strict=True, allow_inf_nan=False, extra="forbid", validate_default=True)
+"""Nothing is taken for what it is not: no text for a number, no number for a truth value."""
 
 
-def number(
-    low: float = -math.inf,
-    high: float = math.inf,
-    *,
-    above: float | None = None,
-) -> Converter:
-    """Accept finite numbers in [low, high], or above ``above``."""
-    accepted = "a finite number"
-    if above is not None:
-        accepted += f" > {above:g}"
-    elif math.isfinite(low) and math.isfinite(high):
-        accepted = f"a number in [{low:g}, {high:g}]"
-    elif math.isfinite(low):
-        accepted += f" >= {low:g}"
-
-    def convert(name: str, value: Any) -> float:
-        refused = isinstance(value, bool | np.bool_ | complex | np.complexfloating | str | bytes)
-        if refused or not hasattr(value, "__float__"):
-            raise InputTypeError(rejection(name, value, accepted))
-        try:
-            result = float(value)
-        except (TypeError, ValueError, RuntimeError, OverflowError):
-            raise InputTypeError(rejection(name, value, accepted)) from None
-        inside = low <= result <= high and (above is None or result > above)
-        if not (math.isfinite(result) and inside):
-            raise InputError(rejection(name, value, accepted))
-        return result
-
-    return convert
+Element = TypeVar("Element")
 
 
-def count(low: int = 1, high: int = 2**63 - 1) -> Converter:
-    """Accept whole numbers in [low, high]; the highest possible is what an int64 holds."""
-    accepted = f"a whole number >= {low}"
+class OneOf:
+    """Annotates text that is one of ``choices``."""
 
-    def convert(name: str, value: Any) -> int:
-        if isinstance(value, bool) or not hasattr(value, "__index__"):
-            raise InputTypeError(rejection(name, value, accepted))
-        try:
-            result = int(value.__index__())
-        except TypeError:
-            raise InputTypeError(rejection(name, value, accepted)) from None
-        if result < low:
-            raise InputError(rejection(name, value, accepted))
-        if result > high:
-            raise InputError(rejection(name, value, f"a whole number <= {high}"))
-        return result
+    def __init__(self, *choices: str) -> None:
+        self.choices = choices
 
-    return convert
+    def __get_pydantic_core_schema__(self, _: Any, handler: GetCoreSchemaHandler) -> Any:
+        """What pydantic asks an annotation for."""
+        return handler.generate_schema(Literal[self.choices])
 
 
-thread_count = count(1, MOST_THREADS)
-"""Accept how many threads or processes work at the same time."""
+def _require_content(text: str) -> str:
+    if not text.strip():
+        raise ValueError
+    return text
 
 
-def switch(name: str, value: Any) -> bool:
-    """Accept true and false."""
-    if not isinstance(value, bool):
-        raise InputTypeError(rejection(name, value, "true or false"))
-    return value
+OrOne = BeforeValidator(lambda value: value if isinstance(value, tuple) else (value,))
+"""Annotates a tuple for which a single element may stand."""
+
+Number = Annotated[float, Field()]
+PositiveNumber = Annotated[float, Field(gt=0.0)]
+NonNegativeNumber = Annotated[float, Field(ge=0.0)]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+Count = Annotated[int, Field(ge=1, le=LARGEST_COUNT)]
+CountOrZero = Annotated[int, Field(ge=0, le=LARGEST_COUNT)]
+Threads = Annotated[int, Field(ge=1, le=MOST_THREADS)]
+"""How many threads or processes work at the same time."""
+Text = Annotated[str, AfterValidator(_require_content)]
+ZeroOrMore = Annotated[tuple[Element, ...], OrOne]
+OneOrMore = Annotated[tuple[Element, ...], OrOne, Field(min_length=1)]
 
 
-def choice(*choices: str) -> Converter:
-    """Accept one of ``choices``."""
-
-    def convert(name: str, value: Any) -> str:
-        require_choice(name, value, choices)
-        return str(value)
-
-    return convert
+def parameter(default: Any = dataclasses.MISSING, *, symbol: str = "", unit: str = "") -> Any:
+    """Declare a field of :class:`Parameters`: its default, paper symbol and unit."""
+    return dataclasses.field(default=default, metadata={"symbol": symbol, "unit": unit})
 
 
-def text(name: str, value: Any) -> str:
-    """Accept text that is not empty."""
-    if not isinstance(value, str):
-        raise InputTypeError(rejection(name, value, "text"))
-    if not value.strip():
-        raise InputError(rejection(name, value, "text that is not empty"))
-    return value
+def checked(annotation: Any, name: str, value: Any) -> Any:
+    """A value as a field of an annotated type keeps it.
+
+    Args:
+        annotation: the type, such as :data:`Count`.
+        name: that an error begins with.
+        value: to be checked.
+
+    Raises:
+        InputError: (a ``ValueError``) a value out of its range.
+        InputTypeError: (also a ``TypeError``) a value of the wrong type.
+    """
+    try:
+        return _adapter(annotation).validate_python(_plain(value))
+    except ValidationError as error:
+        raise _in_one_line(error, annotation, value, name) from None
 
 
-def optional(convert: Converter) -> Converter:
-    """Accept None, and what ``convert`` accepts."""
-
-    def convert_or_none(name: str, value: Any) -> Any:
-        return None if value is None else convert(name, value)
-
-    return convert_or_none
-
-
-def one_or_more(element: Converter, accepted: str) -> Converter:
-    """Accept one value or a list of them; keep a tuple."""
-    several = sequence(element, accepted)
-
-    def convert(name: str, value: Any) -> tuple[Any, ...]:
-        if isinstance(value, list | tuple):
-            return several(name, value)
-        return (element(name, value),)
-
-    return convert
-
-
-def sequence(element: Converter, accepted: str, *, length: int | None = None) -> Converter:
-    """Accept lists, tuples, arrays and tensors of at least one element; keep them as tuples."""
-
-    def convert(name: str, value: Any) -> tuple[Any, ...]:
-        items = value.tolist() if hasattr(value, "tolist") else value
-        if not isinstance(items, list | tuple):
-            raise InputTypeError(rejection(name, value, accepted))
-        if not items or (length is not None and len(items) != length):
-            raise InputError(rejection(name, value, accepted))
-        return tuple(element(f"{name}[{index}]", item) for index, item in enumerate(items))
-
-    return convert
+def accepted(annotation: Any) -> str:
+    """What an annotated type accepts, in words."""
+    info = declared(annotation)
+    kind: Any = info.annotation
+    if info.description:
+        return info.description
+    if choices := _choices(annotation):
+        return f"one of {', '.join(choices)}"
+    if typing.get_origin(kind) is tuple:
+        element = typing.get_args(kind)[0]
+        return f"a list of {', '.join(_choices(element)) or accepted(element)}"
+    if kind not in (int, float):
+        words = {bool: "true or false", str: "text that is not empty"}
+        return words.get(kind, "names with values")
+    bounds: dict[str, float] = {}
+    for bound in info.metadata:
+        bounds |= dataclasses.asdict(bound)
+    if kind is int:
+        return f"a whole number >= {bounds['ge']}"
+    if "le" in bounds:
+        return f"a number in [{bounds['ge']:g}, {bounds['le']:g}]"
+    if "gt" in bounds:
+        return f"a finite number > {bounds['gt']:g}"
+    return f"a finite number >= {bounds['ge']:g}" if "ge" in bounds else "a finite number"
 
 
-def increasing_pair(low: float, high: float = math.inf) -> Converter:
-    """Accept two numbers (first, last) with low <= first <= last <= high."""
-    accepted = f"two numbers (low, high) with {low:g} <= low <= high"
-    pair = sequence(number(low, high), accepted, length=2)
-
-    def convert(name: str, value: Any) -> tuple[float, float]:
-        first, last = pair(name, value)
-        if first > last:
-            raise InputError(rejection(name, value, accepted))
-        return first, last
-
-    return convert
+def _choices(annotation: Any) -> tuple[str, ...]:
+    metadata = declared(annotation).metadata
+    return next((check.choices for check in metadata if isinstance(check, OneOf)), ())
 
 
-def parameter(
-    convert: Converter, default: Any = dataclasses.MISSING, *, symbol: str = "", unit: str = ""
-) -> Any:
-    """Declare a field of :class:`Parameters`: its check, default, paper symbol and unit."""
-    metadata = {"convert": convert, "symbol": symbol, "unit": unit}
-    return dataclasses.field(default=default, metadata=metadata)
-
-
-def refuse_unknown(owner: str, names: Iterable[str], known: Iterable[str]) -> None:
+def refuse_unknown(owner: str, names: Iterable[object], known: Iterable[str]) -> None:
     """Accept only names that are known.
 
     Raises:
@@ -190,9 +139,12 @@ def refuse_unknown(owner: str, names: Iterable[str], known: Iterable[str]) -> No
     known = list(known)
     for name in names:
         if name not in known:
-            similar = difflib.get_close_matches(str(name)[:80], known, n=1)
-            hint = f"did you mean {similar[0]!r}?" if similar else f"one of {', '.join(known)}"
-            raise InputError(f"{owner}: unknown field {brief(name)}: {hint}")
+            raise _unknown(owner, name, known)
+
+
+def _unknown(owner: str, name: object, known: Iterable[str]) -> InputError:
+    hint = did_you_mean(str(name)[:80], known).strip(" ()") or f"one of {', '.join(known)}"
+    return InputError(f"{owner}: unknown field {brief(name)}: {hint}")
 
 
 def mapping(name: str, value: object) -> dict[str, Any]:
@@ -206,68 +158,38 @@ def mapping(name: str, value: object) -> dict[str, Any]:
     return {str(key): entry for key, entry in value.items()}
 
 
-def require_plain_yaml(path: Path) -> str:
-    """The text of a YAML file whose content is no larger and no deeper than it looks.
+class _InOneLine(ABCMeta):
+    """Creates records, and answers what they do not accept in one line."""
 
-    An alias could make a few lines into gigabytes, and brackets in brackets could exhaust the
-    stack of a parser.
-
-    Raises:
-        InputError: it is no file, too large, too deep, or has aliases; the message is the reason.
-        OSError: it cannot be read.
-        YAMLError: it is not YAML.
-    """
-    if path.exists() and not path.is_file():
-        raise InputError("cannot be read (not a file)")
-    with path.open("rb") as file:
-        content = file.read(LARGEST_YAML + 1)
-    if len(content) > LARGEST_YAML:
-        raise InputError(f"cannot be read (larger than {LARGEST_YAML} bytes)")
-    text, depth = content.decode("utf-8"), 0
-    for event in yaml.parse(text, YAML_LOADER):
-        if isinstance(event, yaml.AliasEvent):
-            raise InputError("cannot be read (it has aliases)")
-        if isinstance(event, yaml.ScalarEvent) and len(event.value) > LONGEST_YAML:
-            raise InputError(f"cannot be read (a value of more than {LONGEST_YAML} characters)")
-        depth += isinstance(event, yaml.CollectionStartEvent)
-        depth -= isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST_YAML:
-            raise InputError(f"cannot be read (nested more than {DEEPEST_YAML} times)")
-    return text
-
-
-def read_yaml(path: str | Path) -> dict[str, Any]:
-    """Read names with values from a YAML file; nothing in it is run or looked up.
-
-    Raises:
-        InputError: no such file, not YAML, or not names with values; the message is the reason.
-    """
-    try:
-        content = require_plain_yaml(Path(path))
-        values = OmegaConf.to_container(OmegaConf.load(StringIO(content)), resolve=False)
-    except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
-        if isinstance(error, InputError):
-            raise
-        reason = one_line(str(error))[:200]
-        raise InputError(f"cannot be read ({reason})") from None
-    if not isinstance(values, dict):
-        raise InputError("expected fields with values")
-    return {str(name): value for name, value in values.items()}
+    def __call__(cls, /, *values: Any, **named: Any) -> Any:
+        if not is_pydantic_dataclass(cls):
+            raise TypeError(f"{cls.__name__} is to be a dataclass of pydantic.dataclasses")
+        try:
+            return super().__call__(*map(_plain, values), **_plain(named))
+        except ValidationError as error:
+            given = dict(zip(_hints(cls), values, strict=False)) | named
+            raise _in_one_line(error, cls, given) from None
 
 
 @dataclass(frozen=True)
-class Parameters:
-    """A record whose fields, declared with :func:`parameter`, are checked on creation.
+class Parameters(metaclass=_InOneLine):
+    """A record that checks its fields on creation: a frozen dataclass of pydantic.
+
+    Every field has an annotated type, such as :data:`Count`, and is declared by
+    :func:`parameter`; it may be such a record itself. Lists, arrays and tensors are taken for
+    tuples, NumPy's numbers for Python's.
 
     Raises:
         InputError: (a ``ValueError``) a value out of its range.
         InputTypeError: (also a ``TypeError``) a value of the wrong type.
     """
 
-    def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            converted = field.metadata["convert"](field.name, getattr(self, field.name))
-            object.__setattr__(self, field.name, converted)
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        """What pydantic asks a field's type for: names with values are taken for a record."""
+        return {**handler(source), "strict": False}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -276,17 +198,10 @@ class Parameters:
         Raises:
             InputError: no names with values, or an unknown, missing or unacceptable field.
         """
-        owner = cls.__name__.lower()
-        mapping(owner, values)
-        fields = dataclasses.fields(cls)
-        refuse_unknown(owner, values, [field.name for field in fields])
-        for field in fields:
-            if field.default is dataclasses.MISSING and field.name not in values:
-                raise InputError(f"{owner}: {field.name} is missing")
-        return cls(**values)
+        return cls(**mapping(cls.__name__.lower(), values))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values (numbers, strings, lists), as :meth:`from_dict` takes them."""
+        """Plain values (numbers, strings, lists, mappings), as :meth:`from_dict` takes them."""
         return {
             field.name: _as_lists(getattr(self, field.name)) for field in dataclasses.fields(self)
         }
@@ -309,6 +224,89 @@ class Parameters:
 
 
 def _as_lists(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_as_lists(item) for item in value]
+    if isinstance(value, Parameters):
+        return value.to_dict()
+    return [_as_lists(item) for item in value] if isinstance(value, tuple) else value
+
+
+def _plain(value: Any, depth: int = DEEPEST) -> Any:
+    """Lists, arrays and tensors as tuples, NumPy's numbers as Python's, also in mappings."""
+    if type(value) in SCALARS:
+        return value
+    try:
+        value = value.tolist() if hasattr(value, "tolist") else value
+    except (TypeError, ValueError, RuntimeError):  # a tensor without content
+        return value
+    if isinstance(value, list | tuple) and depth:
+        return tuple(_plain(item, depth - 1) for item in value)
+    if isinstance(value, Mapping) and depth:
+        return {name: _plain(entry, depth - 1) for name, entry in value.items()}
     return value
+
+
+@functools.lru_cache(maxsize=128)
+def _adapter(annotation: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(annotation, config=STRICT)
+
+
+@functools.cache
+def _hints(owner: type[Parameters]) -> dict[str, Any]:
+    """The fields of a record and their annotated types."""
+    hints = typing.get_type_hints(owner, include_extras=True)
+    return {field.name: hints[field.name] for field in dataclasses.fields(owner)}
+
+
+def declared(annotation: Any) -> FieldInfo:
+    """An annotated type and what is checked of it, where it is not None."""
+    info = FieldInfo.from_annotation(annotation)
+    kinds = typing.get_args(info.annotation)
+    return declared(kinds[0]) if type(None) in kinds else info
+
+
+def _in_one_line(error: ValidationError, annotation: Any, value: Any, name: str = "") -> InputError:
+    """What pydantic finds wrong at first, in this project's words.
+
+    Args:
+        error: of pydantic.
+        annotation: the type that was expected.
+        value: that was given.
+        name: of the value; none where it is a record, whose fields are named.
+    """
+    first = error.errors(include_url=False)[0]
+    kind, context = first["type"], first.get("ctx", {})
+    place: tuple[Any, ...] = first["loc"]
+    for part in place:
+        expected: Any = declared(annotation).annotation
+        if isinstance(expected, _InOneLine):
+            owner, hints = name or expected.__name__.lower(), _hints(expected)
+            part = list(hints)[part] if isinstance(part, int) and part < len(hints) else part
+            name = f"{name}.{part}" if name else str(part)
+            if refusal := _of_names(kind, owner, part, hints, value):
+                return refusal
+            annotation, value = hints[part], value.get(part)
+        elif kind != "missing":  # or the tuple as a whole is too short
+            elements = typing.get_args(expected)
+            annotation = elements[0 if elements[-1] is ... else part]
+            if isinstance(_plain(value), tuple):  # else a single element stands for it
+                name, value = f"{name}[{part}]", _plain(value)[part]
+    if isinstance(own := context.get("error"), InputError):  # which a record raised itself
+        return type(own)(f"{name}.{own}") if name else own
+    words = accepted(annotation)
+    if kind == "literal_error":
+        words += did_you_mean(value, _choices(annotation))
+    if kind == "less_than_equal" and isinstance(context["le"], int):
+        words = f"a whole number <= {context['le']}"
+    line = rejection(name, value, words)
+    return InputTypeError(line) if kind.endswith("_type") else InputError(line)
+
+
+def _of_names(
+    kind: str, owner: str, name: Any, known: Iterable[str], given: Mapping[str, Any]
+) -> InputError | None:
+    """The answer to a field of a record that is unknown, missing or given twice."""
+    if kind in ("unexpected_positional_argument", "multiple_argument_values"):
+        return InputTypeError(f"{owner}: {kind.replace('_', ' ')}: {brief(name)}")
+    if name not in known:
+        return _unknown(owner, name, known)
+    missing = kind == "missing" and name not in given
+    return InputTypeError(f"{owner}: {name} is missing") if missing else None

@@ -10,7 +10,7 @@ from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import switch
+from hyuav._support.parameters import checked
 from hyuav.envs.arguments import (
     as_batch_size,
     as_device,
@@ -97,8 +97,8 @@ class SecureOffloadingEnv(EnvBase):
         self.scenarios = as_scenarios(scenario, self.batch_size)
         self.physics = Physics(self.scenarios[0], self.device, nodes=self._layout())
         self.schemes = as_schemes(scheme, self.batch_size)
-        self.diagnostics = switch("diagnostics", diagnostics)
-        self.tells_fading = switch("fading", fading)
+        self.diagnostics = checked(bool, "diagnostics", diagnostics)
+        self.tells_fading = checked(bool, "fading", fading)
         flags = ModeRule.of(self.schemes, self.device)
         self._mode_rule = ModeRule(*(self._per_row(flag) for flag in flags))
         norm_limit = self.physics.norm_limit(self.schemes)

@@ -7,7 +7,7 @@ from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
-from hyuav._support.parameters import switch
+from hyuav._support.parameters import checked
 from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.observation import JointView
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
@@ -108,10 +108,10 @@ def make_env(
     Raises:
         InputError: as :class:`SecureOffloadingEnv`.
     """
-    switch("clock", clock)
-    switch("geofence", geofence)
+    checked(bool, "clock", clock)
+    checked(bool, "geofence", geofence)
     env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics, fading)
-    kind = CompiledEnv if switch("compiled", compiled) else TransformedEnv
+    kind = CompiledEnv if checked(bool, "compiled", compiled) else TransformedEnv
     return kind(
         env,
         Compose(

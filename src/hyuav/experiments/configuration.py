@@ -38,8 +38,9 @@ from hyuav._support.interruption import interrupted_by_sigterm
 from hyuav._support.parameters import Parameters, mapping, refuse_unknown
 from hyuav._support.start import loaded, program
 from hyuav.experiments.configuration_files import read_files_as_data
+from hyuav.experiments.own_algorithms import run_named, with_own
 from hyuav.experiments.usage import usage
-from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.registry import ALGORITHMS, file_name, run_own
 from hyuav.physics.scenario import PRESETS, Scenario
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
@@ -63,7 +64,7 @@ def register(groups: Iterable[str]) -> None:
         store.store(group="scenario", name=name, node=node)
     for name, algorithm in ALGORITHMS.items():
         node = {"name": name, **algorithm().to_dict()}
-        store.store(group="algorithm", name=name, node=node)
+        store.store(group="algorithm", name=file_name(name), node=node)
     for group in {"scenario", "algorithm"}.difference(groups):
         del store.repo[group]
 
@@ -96,10 +97,13 @@ def recipe(
 
     def decorate(function: Callable[[Config, Path], None]) -> Callable[[], None]:
         composed = False
+        references: list[str] = []
 
         def run(config: DictConfig) -> None:
             nonlocal composed
             composed = True
+            for reference in references:  # which a launcher's worker has not run yet
+                run_own(reference)
             directory = Path(HydraConfig.get().runtime.output_dir)
             hint = "" if NOW in run_directory else ", and the same command goes on"
             try:
@@ -116,7 +120,7 @@ def recipe(
         run.__module__ = "__main__"
 
         def command() -> None:
-            nonlocal composed
+            nonlocal composed, references
             composed = False
             read_files_as_data()
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
@@ -129,6 +133,8 @@ def recipe(
                 return
             with _ending_in_one_line(lambda: composed):
                 loaded()  # from here on an interruption is answered
+                references = run_named(chosen="algorithm" in groups)
+                register(groups)
                 _refuse_overrides(node, groups)
                 hydra.main(version_base=None, config_path=None, config_name=name)(run)()
 
@@ -281,7 +287,7 @@ def telling_how_to_go_on(
         Interrupted: in place of any other interruption, with the command.
         Halted: with the command where going on is possible; in place of an OSError too.
     """
-    hint = f"go on with: {shlex.join([*program(), *overrides])}"
+    hint = f"go on with: {shlex.join([*program(), *with_own(overrides)])}"
     try:
         with interrupted_by_sigterm(), _halting(""):
             yield

@@ -10,7 +10,7 @@ from hydra.core.plugins import Plugins
 from hydra.plugins.config_source import ConfigResult
 
 from hyuav._support.errors import InputError, brief, rejection
-from hyuav._support.parameters import read_yaml
+from hyuav._support.yaml_files import read_yaml
 
 ORDERS = ("defaults", "hydra", "_target_")
 """Names under which Hydra takes orders: what else to read, where to write, what to call."""

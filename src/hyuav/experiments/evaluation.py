@@ -4,11 +4,13 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
 import torch
+from pydantic import Field
+from pydantic.dataclasses import dataclass as pydantic_dataclass
 from scipy import stats
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
@@ -16,7 +18,7 @@ from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.files import write_durably
-from hyuav._support.parameters import Parameters, count, number, parameter
+from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNumber, parameter
 from hyuav._support.randomness import derived_seed
 from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
@@ -28,14 +30,14 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 EVALUATION_FILE, FLIGHTS_FILE = "evaluation.json", "flights.parquet"
 
 
-@dataclass(frozen=True)
+@pydantic_dataclass(frozen=True)
 class EvaluationParameters(Parameters):
     """How to evaluate."""
 
-    episodes: int = parameter(count(2, 10**6), 1000)
-    flights: int = parameter(count(), 3)
-    seed: int = parameter(count(0), 10_000)
-    resolution: float = parameter(number(above=0.0), RESOLUTION, unit="m")
+    episodes: Annotated[int, Field(ge=2, le=10**6)] = parameter(1000)
+    flights: Count = parameter(3)
+    seed: CountOrZero = parameter(10_000)
+    resolution: PositiveNumber = parameter(RESOLUTION, unit="m")
 
 
 @dataclass(frozen=True)

@@ -1,32 +1,36 @@
 """The run directory: configuration, metrics, checkpoints, evaluation and figures of a training."""
 
 import dataclasses
-import fcntl
-import os
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
+from filelock import FileLock, Timeout
 from omegaconf import OmegaConf
+from pydantic import Field
 from torch import Tensor
 
-from hyuav._support.errors import BusyError, InputError, rejection, require_choice
+from hyuav._support.errors import BusyError, InputError, rejection
 from hyuav._support.files import create_durably
-from hyuav._support.parameters import mapping, read_yaml, sequence
+from hyuav._support.parameters import checked, mapping
+from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import read_metrics
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.cohort import Learner
-from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.registry import find
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
 
 REPORT_FILE = "report.html"
+
+LOCK_FILE = ".lock"
+"""There while a process trains."""
 
 
 @dataclass(frozen=True)
@@ -79,19 +83,12 @@ class RunConfiguration:
         return Training(self.scenario, self.learners, self.algorithm, self.training, device)
 
 
-def _learner(name: str, value: object) -> Learner:
-    if isinstance(value, Learner):
-        return value
-    fields = mapping(name, value)
-    try:
-        return Learner.from_dict(fields)
-    except InputError as error:
-        raise type(error)(f"{name}: {error}") from None
+Learners = Annotated[tuple[Learner, ...], Field(min_length=1, description="a list of learners")]
 
 
 def _learners(values: object, num_slots: int) -> tuple[Learner, ...]:
     """Learners that differ, where those without a horizon of their own have ``num_slots``."""
-    learners: tuple[Learner, ...] = sequence(_learner, "a list of learners")("learners", values)
+    learners: tuple[Learner, ...] = checked(Learners, "learners", values)
     resolved = [
         dataclasses.replace(learner, num_slots=learner.num_slots or num_slots)
         for learner in learners
@@ -133,8 +130,7 @@ def named_algorithm(values: object) -> tuple[str, AlgorithmParameters]:
     """An algorithm and its name, from its hyperparameters with a ``name``."""
     fields = mapping("algorithm", values)
     name = fields.pop("name", None)
-    require_choice("algorithm", name, ALGORITHMS)
-    return str(name), ALGORITHMS[str(name)].from_dict(fields)
+    return str(name), find(name).from_dict(fields)
 
 
 class RunDirectory:
@@ -201,17 +197,17 @@ class RunDirectory:
     def reserved(self) -> Iterator[None]:
         """Let no other process train here meanwhile; a process that is killed reserves nothing.
 
-        Where the file system cannot lock a directory, nobody is kept away.
+        Where the file system cannot lock a file, nobody is kept away.
 
         Raises:
             BusyError: another process trains here.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        directory = os.open(self.path, os.O_RDONLY)
+        file = self.path / LOCK_FILE
+        lock = FileLock(file, timeout=0, fallback_to_soft=False)
         try:
-            fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(directory)
+            lock.acquire()
+        except Timeout:
             accepted = "one in which no other process trains"
             raise BusyError(rejection("run directory", str(self.path), accepted)) from None
         except OSError:
@@ -219,7 +215,10 @@ class RunDirectory:
         try:
             yield
         finally:
-            os.close(directory)
+            if lock.is_locked:
+                with suppress(OSError):  # Windows removes it with the lock
+                    file.unlink()
+                lock.release()
 
     def configuration(self) -> RunConfiguration:
         """What the training was asked to do.

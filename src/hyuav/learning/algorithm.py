@@ -4,8 +4,11 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import torch
+from pydantic import Field
+from pydantic.dataclasses import dataclass as pydantic_dataclass
 from tensordict import TensorDictBase
 from tensordict.nn import (
     TensorDictModule,
@@ -16,7 +19,15 @@ from tensordict.nn import (
 from torch import Tensor, nn
 from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 
-from hyuav._support.parameters import Parameters, choice, count, number, parameter, sequence, switch
+from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    Fraction,
+    OneOf,
+    Parameters,
+    PositiveNumber,
+    parameter,
+)
 from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.exploration import WarmUp
@@ -29,49 +40,50 @@ from hyuav.learning.replay import Memory
 from hyuav.learning.targets import raise_target
 from hyuav.physics.scenario import Scenario
 
-learning_rate = number(0.0, 1.0)
+Sizes = Annotated[
+    tuple[Count, ...],
+    Field(min_length=1, description="the sizes of at least one hidden layer"),
+]
 
 VARIATE_LEARNING_RATE = 1e-3
 
 
-@dataclass(frozen=True)
+@pydantic_dataclass(frozen=True)
 class AlgorithmParameters(Parameters, ABC):
     """What all algorithms have in common; the defaults are the paper's."""
 
-    hidden_sizes: tuple[int, ...] = parameter(
-        sequence(count(), "the sizes of at least one hidden layer"), (300, 100, 100)
-    )
-    activation: str = parameter(choice(*ACTIVATIONS), "tanh")
-    actor_learning_rate: float = parameter(learning_rate, 1e-4)
-    critic_learning_rate: float = parameter(learning_rate, 1e-4)
-    discount: float = parameter(number(0.0, 1.0), 0.95, symbol="gamma")
-    target_rate: float = parameter(number(0.0, 1.0), 0.005, symbol="tau")
-    clock: bool = parameter(switch, False)
+    hidden_sizes: Sizes = parameter((300, 100, 100))
+    activation: Annotated[str, OneOf(*ACTIVATIONS)] = parameter("tanh")
+    actor_learning_rate: Fraction = parameter(1e-4)
+    critic_learning_rate: Fraction = parameter(1e-4)
+    discount: Fraction = parameter(0.95, symbol="gamma")
+    target_rate: Fraction = parameter(0.005, symbol="tau")
+    clock: bool = parameter(False)
     """Observe the slots flown. The last slot then ends the return: what is observed after it is
     never the beginning of a slot, so that a value there would not be learned."""
-    geofence: bool = parameter(switch, False)
+    geofence: bool = parameter(False)
     """Slow flights so that they end on the map."""
-    reward_scale: float = parameter(number(above=0.0), 1.0)
-    layer_norm: bool = parameter(switch, False)
+    reward_scale: PositiveNumber = parameter(1.0)
+    layer_norm: bool = parameter(False)
     """In the critics."""
-    afterstate: bool = parameter(switch, False)
+    afterstate: bool = parameter(False)
     """Let the critics see where an action leads; see
     :class:`hyuav.learning.afterstate.Afterstate`."""
-    warm_up_episodes: int = parameter(count(0), 0)
+    warm_up_episodes: CountOrZero = parameter(0)
     """Flown to places all over the map; see :class:`hyuav.learning.exploration.WarmUp`."""
-    repeat_every: int = parameter(count(0), 0)
+    repeat_every: CountOrZero = parameter(0)
     """After the warm-up, every n-th episode takes the actions of the best flight so far, or of one
     that may be better; 0 for never. See :class:`hyuav.learning.guide.planner.FlightSearch`."""
-    control_variate: bool = parameter(switch, False)
+    control_variate: bool = parameter(False)
     """Take off each reward what its slot's fading brought; see
     :class:`hyuav.learning.guide.control_variate.ControlVariate`."""
-    imagined_flights: int = parameter(count(0, 100_000), 0)
+    imagined_flights: Annotated[int, Field(ge=0, le=100_000)] = parameter(0)
     """After each episode from the end of the warm-up on, where flights are kept and there is a
     control variate: how many straight flights are judged, and as many variations of the best; see
     :class:`hyuav.learning.guide.proposals.Imagination`."""
-    action_stretch: float = parameter(number(1.0, 2.0), 1.0)
+    action_stretch: Annotated[float, Field(ge=1.0, le=2.0)] = parameter(1.0)
     """Of the tanh that ends the actor; see :class:`hyuav.learning.networks.StretchedTanh`."""
-    alternatives_weight: float = parameter(number(0.0, 1e6), 0.0)
+    alternatives_weight: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(0.0)
     """How strongly the actor is drawn to an alternative that is worth more than what it does; with
     any weight, the critics' target counts whichever is worth more. See
     :class:`hyuav.learning.guide.imitation.Alternatives`."""

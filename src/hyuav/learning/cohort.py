@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import torch
+from pydantic.dataclasses import dataclass
 from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.collectors import Collector
 
-from hyuav._support.parameters import Parameters, choice, count, optional, parameter
+from hyuav._support.parameters import Count, CountOrZero, Parameters, parameter
 from hyuav._support.randomness import (
     RowStream,
     derived_seed,
@@ -35,7 +35,7 @@ from hyuav.learning.weights import (
     load_weights,
     replace_learners,
 )
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.offloading import ModeRuleName
 from hyuav.physics.scenario import Scenario
 
 
@@ -48,9 +48,9 @@ class Learner(Parameters):
     or horizon begin with the same weights and meet the same luck.
     """
 
-    scheme: str = parameter(choice(*MODE_RULES), "hybrid")
-    seed: int = parameter(count(0), 0)
-    num_slots: int | None = parameter(optional(count()), None, symbol="T")
+    scheme: ModeRuleName = parameter("hybrid")
+    seed: CountOrZero = parameter(0)
+    num_slots: Count | None = parameter(None, symbol="T")
     """The horizon; the scenario's where it is None."""
 
 

@@ -1,13 +1,15 @@
 """DDPG as in the paper's Algorithm 1 (Lillicrap et al., ICLR 2016)."""
 
-from dataclasses import dataclass
+from typing import Annotated
 
+from pydantic import Field
+from pydantic.dataclasses import dataclass
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule, TensorDictSequential
 from torch import Tensor
 from torchrl.objectives import DDPGLoss, LossModule, SoftUpdate
 
-from hyuav._support.parameters import choice, number, parameter
+from hyuav._support.parameters import Fraction, OneOf, parameter
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, GradientStep, adam
 from hyuav.learning.exploration import GaussianNoise
 from hyuav.learning.guide.demonstrations import BestFlights
@@ -26,9 +28,9 @@ def act(loss: LossModule, batch: TensorDictBase) -> Tensor:
 class DDPG(AlgorithmParameters):
     """The paper's hyperparameters; the noise is in units of v_max."""
 
-    noise_variance: float = parameter(number(0.0, 1e6), 0.6)
-    noise_decay: float = parameter(number(0.0, 1.0), 0.999)
-    noise_decay_per: str = parameter(choice("slot", "episode"), "slot")
+    noise_variance: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(0.6)
+    noise_decay: Fraction = parameter(0.999)
+    noise_decay_per: Annotated[str, OneOf("slot", "episode")] = parameter("slot")
 
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""

@@ -1,10 +1,11 @@
 """SAC: a stochastic actor with a learned temperature (Haarnoja et al., 2018)."""
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import torch
+from pydantic import Field
+from pydantic.dataclasses import dataclass
 from tensordict import TensorDictBase
 from tensordict.nn import NormalParamExtractor, TensorDictModule, TensorDictSequential
 from torch import Tensor, nn
@@ -13,13 +14,12 @@ from torchrl.modules import ProbabilisticActor, TanhNormal
 from torchrl.objectives import SACLoss, SoftUpdate
 from torchrl.objectives.sac import compute_rsample_log_prob
 
-from hyuav._support.parameters import number, parameter
+from hyuav._support.parameters import Fraction, parameter
 from hyuav.learning.algorithm import (
     Algorithm,
     AlgorithmParameters,
     GradientStep,
     adam,
-    learning_rate,
 )
 from hyuav.learning.guide.demonstrations import BestFlights
 from hyuav.learning.networks import LearnerMLP, StretchedTanh, stretched
@@ -71,9 +71,9 @@ class LearnerSACLoss(SACLoss):
 class SAC(AlgorithmParameters):
     """SAC's hyperparameters beside the common ones; the target entropy is minus dim(a)."""
 
-    temperature_learning_rate: float = parameter(learning_rate, 3e-4)
-    temperature_init: float = parameter(number(1e-6, 1e6), 0.2)
-    target_entropy: float = parameter(number(-100.0, 100.0), -2.0)
+    temperature_learning_rate: Fraction = parameter(3e-4)
+    temperature_init: Annotated[float, Field(ge=1e-6, le=1e6)] = parameter(0.2)
+    target_entropy: Annotated[float, Field(ge=-100.0, le=100.0)] = parameter(-2.0)
 
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""

@@ -5,19 +5,20 @@ is compared with that of the cohort before any is taken.
 """
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import torch
+from pydantic import Field
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, brief, rejection
-from hyuav._support.parameters import count, number
+from hyuav._support.parameters import NonNegativeNumber, checked
 
 if TYPE_CHECKING:
     from hyuav.learning.cohort import Cohort
 
-counted = count(0, 2**53)
-"""Accept how many episodes, updates or draws there were: all float64 can tell apart."""
+Counted = Annotated[int, Field(ge=0, le=2**53)]
+"""How many episodes, updates or draws there were: all float64 can tell apart."""
 
 BEGIN = ("step_count", "done", "terminated", "truncated")
 """Zero where a flight begins, as between two episodes."""
@@ -86,8 +87,8 @@ def require_state(name: str, state: Any, cohort: "Cohort") -> None:
     require_entries(name, state, example)
     for part in ("modules", "best_evaluation", "best_weights", "stopped"):
         require_like(f"{name}.{part}", state[part], example[part])
-    episode = counted(f"{name}.episode", state["episode"])
-    counted(f"{name}.updates", state["updates"])
+    episode = checked(Counted, f"{name}.episode", state["episode"])
+    checked(Counted, f"{name}.updates", state["updates"])
     stopped, best = state["stopped"], state["best_evaluation"]
     flown = episode * cohort.scenario.num_slots
     if not ((stopped >= 0) & (stopped <= flown)).all():
@@ -133,7 +134,7 @@ def _require_draws(name: str, value: Any, example: dict[str, Any]) -> None:
         if isinstance(own, Tensor):
             require_like(f"{name}.{key}", value[key], own)
         else:
-            counted(f"{name}.{key}", value[key])
+            checked(Counted, f"{name}.{key}", value[key])
 
 
 def _require_optimizer(name: str, value: Any, optimizer: torch.optim.Optimizer) -> None:
@@ -155,7 +156,7 @@ def _require_optimizer(name: str, value: Any, optimizer: torch.optim.Optimizer) 
             raise InputError(f"{name}.state: unknown entry {brief(index)}")
         like = {"step": torch.zeros(()), "exp_avg": weights[index], "exp_avg_sq": weights[index]}
         require_like(f"{name}.state[{index}]", moments, like)
-        number(0.0)(f"{name}.state[{index}].step", moments["step"])
+        checked(NonNegativeNumber, f"{name}.state[{index}].step", moments["step"])
 
 
 def _require_replay(name: str, value: Any, example: dict[str, Any], cohort: "Cohort") -> None:
@@ -167,9 +168,10 @@ def _require_replay(name: str, value: Any, example: dict[str, Any], cohort: "Coh
     require_entries(f"{name}._storage", storage, example["_storage"])
     require_entries(f"{name}._writer", writer, example["_writer"])
     capacity = cohort.replay.storage.max_size
-    length = count(0, capacity)(f"{name}._storage._len", storage["_len"])
-    count(0, capacity - 1)(f"{name}._writer._cursor", writer["_cursor"])
-    counted(f"{name}._writer._write_count", writer["_write_count"])
+    filled, last = Field(ge=0, le=capacity), Field(ge=0, le=capacity - 1)
+    length = checked(Annotated[int, filled], f"{name}._storage._len", storage["_len"])
+    checked(Annotated[int, last], f"{name}._writer._cursor", writer["_cursor"])
+    checked(Counted, f"{name}._writer._write_count", writer["_write_count"])
     stored = storage["_storage"]
     require_like(f"{name}._storage.initialized", storage["initialized"], length > 0)
     if length:

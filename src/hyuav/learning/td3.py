@@ -1,11 +1,13 @@
 """TD3: DDPG with twin critics, smoothed targets and a slower actor (Fujimoto et al., ICML 2018)."""
 
-from dataclasses import dataclass
+from typing import Annotated
 
+from pydantic import Field
+from pydantic.dataclasses import dataclass
 from tensordict.nn import TensorDictSequential
 from torchrl.objectives import SoftUpdate, TD3Loss
 
-from hyuav._support.parameters import count, number, parameter
+from hyuav._support.parameters import Count, parameter
 from hyuav.learning.algorithm import Algorithm, GradientStep, adam
 from hyuav.learning.ddpg import DDPG, act
 from hyuav.learning.guide.demonstrations import BestFlights
@@ -16,9 +18,9 @@ from hyuav.physics.scenario import Scenario
 class TD3(DDPG):
     """DDPG's hyperparameters and TD3's own three."""
 
-    target_noise_std: float = parameter(number(0.0, 2.0), 0.2)
-    target_noise_clip: float = parameter(number(0.0, 2.0), 0.5)
-    actor_every: int = parameter(count(), 2)
+    target_noise_std: Annotated[float, Field(ge=0.0, le=2.0)] = parameter(0.2)
+    target_noise_clip: Annotated[float, Field(ge=0.0, le=2.0)] = parameter(0.5)
+    actor_every: Count = parameter(2)
 
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""

@@ -7,21 +7,23 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import torch
+from pydantic.dataclasses import dataclass as pydantic_dataclass
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, one_line, rejection
 from hyuav._support.machine import cores
 from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    NonNegativeNumber,
+    OneOf,
     Parameters,
-    choice,
-    count,
-    number,
+    Threads,
+    checked,
     parameter,
-    switch,
-    thread_count,
 )
 from hyuav._support.recording import COMPILATION_ERRORS, has_compiler
 from hyuav.envs.arguments import as_device
@@ -42,25 +44,24 @@ SECONDS_SAVED = (0.003, 0.0007)
 """Saved per slot, and besides that per learner and slot."""
 
 
-@dataclass(frozen=True)
+@pydantic_dataclass(frozen=True)
 class TrainingParameters(Parameters):
     """How long and on what to learn; the defaults are the paper's where it gives one."""
 
-    num_episodes: int = parameter(count(), 1000)
-    replay_size: int = parameter(count(), 8000)
-    batch_size: int = parameter(count(), 70, symbol="K")
-    evaluation_every: int = parameter(count(), 10, unit="episode")
-    evaluation_episodes: int = parameter(count(), 100)
-    evaluation_seed: int = parameter(count(0), 20_000)
-    compile: str = parameter(choice("auto", "always", "never"), "auto")
-    cohorts: int = parameter(thread_count, cores())
+    num_episodes: Count = parameter(1000)
+    replay_size: Count = parameter(8000)
+    batch_size: Count = parameter(70, symbol="K")
+    evaluation_every: Count = parameter(10, unit="episode")
+    evaluation_episodes: Count = parameter(100)
+    evaluation_seed: CountOrZero = parameter(20_000)
+    compile: Annotated[str, OneOf("auto", "always", "never")] = parameter("auto")
+    cohorts: Threads = parameter(cores())
     """Groups of learners that are trained at the same time, each on a thread of its own; by default
     one for each core."""
-    checkpoint_every: float = parameter(number(0.0), 20.0, unit="s")
+    checkpoint_every: NonNegativeNumber = parameter(20.0, unit="s")
     """What is lost at most when a training is killed; 0 for a checkpoint after every episode."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         if self.batch_size > self.replay_size:
             accepted = f"at most replay_size = {self.replay_size}"
             raise InputError(rejection("batch_size", self.batch_size, accepted))
@@ -345,7 +346,7 @@ class Training:
         """
         try:
             require_entries("training", state, ("cohorts", "can_compile"))
-            can_compile = switch("can_compile", state["can_compile"])
+            can_compile = checked(bool, "can_compile", state["can_compile"])
             cohorts = list(zip(self.cohorts, state["cohorts"], strict=True))
             for index, (cohort, own) in enumerate(cohorts):
                 require_state(f"cohorts[{index}]", own, cohort)

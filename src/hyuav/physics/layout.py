@@ -1,19 +1,21 @@
 """Where the nodes are, and random UE layouts for studies beyond the two presets."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import torch
+from pydantic import Field
 from torch import Tensor
 
-from hyuav._support.parameters import count, number, sequence
+from hyuav._support.parameters import CountOrZero, NonNegativeNumber, checked
 from hyuav._support.randomness import derived_seed
 from hyuav.physics.scenario import Point, Scenario
 
-_length = number(0.0)
-_point = sequence(number(), "two coordinates (x, y) in metres", length=2)
-_ues = count(1, 10**6)
-_sizes = sequence(_ues, "the numbers of UEs of one cluster or more")
+_NumUEs = Annotated[int, Field(ge=1, le=10**6)]
+_Sizes = Annotated[
+    tuple[_NumUEs, ...],
+    Field(min_length=1, description="the numbers of UEs of one cluster or more"),
+]
 
 
 class Nodes(NamedTuple):
@@ -78,9 +80,10 @@ def disk(
     Raises:
         InputError: ``num_ues`` below 1, ``radius`` below 0, or a value of the wrong type.
     """
-    generator = torch.Generator().manual_seed(count(0)("seed", seed))
-    num_ues, radius = _ues("num_ues", num_ues), _length("radius", radius)
-    return _disk(num_ues, radius, _point("center", center), generator)
+    generator = torch.Generator().manual_seed(checked(CountOrZero, "seed", seed))
+    num_ues = checked(_NumUEs, "num_ues", num_ues)
+    radius = checked(NonNegativeNumber, "radius", radius)
+    return _disk(num_ues, radius, checked(Point, "center", center), generator)
 
 
 def clusters(
@@ -106,10 +109,10 @@ def clusters(
     Raises:
         InputError: no cluster, an empty cluster, a negative length, or a value of the wrong type.
     """
-    generator = torch.Generator().manual_seed(count(0)("seed", seed))
-    sizes, center = _sizes("sizes", sizes), _point("center", center)
-    cluster_radius = _length("cluster_radius", cluster_radius)
-    spread = _length("spread", spread)
+    generator = torch.Generator().manual_seed(checked(CountOrZero, "seed", seed))
+    sizes, center = checked(_Sizes, "sizes", sizes), checked(Point, "center", center)
+    cluster_radius = checked(NonNegativeNumber, "cluster_radius", cluster_radius)
+    spread = checked(NonNegativeNumber, "spread", spread)
     turn = torch.rand((), generator=generator, dtype=torch.float64)
     angles = 2 * torch.pi * (turn + torch.arange(len(sizes), dtype=torch.float64) / len(sizes))
     positions: list[Point] = []
@@ -134,7 +137,7 @@ def random_layout(seed: int) -> tuple[Point, ...]:
     Raises:
         InputError: ``seed`` is negative or of the wrong type.
     """
-    seed = count(0)("seed", seed)
+    seed = checked(CountOrZero, "seed", seed)
     if seed % 2 == 0:
         return disk(10, seed=seed)
     generator = torch.Generator().manual_seed(derived_seed(seed, "cluster sizes"))

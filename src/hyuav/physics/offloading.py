@@ -1,11 +1,12 @@
 """Who offloads and in which mode the helper works: the paper's equations 5, 8d, 8f and 11."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import torch
 from torch import Tensor
 
+from hyuav._support.parameters import OneOf
 from hyuav.physics.energy import computation_energy
 
 
@@ -32,6 +33,8 @@ _FLAGS = {
 
 MODE_RULES = tuple(_FLAGS)
 """Who chooses the helpers' modes: the better of both in each slot, or always the same."""
+
+ModeRuleName = Annotated[str, OneOf(*MODE_RULES)]
 
 
 def covered_by_relay(

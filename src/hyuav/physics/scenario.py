@@ -1,25 +1,27 @@
 """What is fixed in an experiment: the node positions and the paper's parameter table."""
 
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Annotated, Any, Self
+
+from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic.dataclasses import dataclass
 
 from hyuav._support.errors import InputError, rejection, require_choice
-from hyuav._support.parameters import (
-    Parameters,
-    choice,
-    count,
-    increasing_pair,
-    number,
-    parameter,
-    sequence,
-    switch,
-)
+from hyuav._support.parameters import Fraction, Number, OneOf, Parameters, parameter
 
 LARGEST_LOAD = 1e30
 """Of the energy in J and the power in W to compute all UEs' largest tasks."""
 
-Point = tuple[float, float]
+Point = Annotated[tuple[Number, Number], Field(description="two coordinates (x, y) in metres")]
 """Horizontal coordinates (x, y) in metres."""
+
+Points = Annotated[
+    tuple[Point, ...],
+    Field(
+        min_length=1,
+        fail_fast=True,
+        description="at least one pair of coordinates (x, y) in metres",
+    ),
+]
 
 PRESETS: dict[str, tuple[Point, ...]] = {
     "random_disk": (
@@ -33,31 +35,49 @@ PRESETS: dict[str, tuple[Point, ...]] = {
 }
 """UE positions in metres of the two layouts that reproduce the paper's figures 3a and 3b."""
 
+Preset = Annotated[str, OneOf(*PRESETS)]
+
 # Wider than any real value, and narrow enough for all that follows from them to be in float32.
-_length, _radius, _flown = number(1e-6, 1e9), number(0.0, 1e9), number(1e-9, 1e9)
-_power, _gain, _noise = number(0.0, 1e6), number(0.0, 1e6), number(1e-24, 1e6)
-_rate, _budget, _capacitance = number(0.0, 1e9), number(0.0, 1e30), number(0.0, 1.0)
-_range = increasing_pair(0.0, 1e12)
-_decibel = number(-100.0, 100.0)
-_exponent = number(0.0, 4.0)  # up to which float32 holds the gains over the longest distances
-_slots = count(1, 10**6)
-_point = sequence(number(), "two coordinates (x, y) in metres", length=2)
-_points = sequence(_point, "at least one pair of coordinates (x, y) in metres")
+Length = Annotated[float, Field(ge=1e-6, le=1e9)]
+Radius = Annotated[float, Field(ge=0.0, le=1e9)]
+Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
+Power = Annotated[float, Field(ge=0.0, le=1e6)]
+Noise = Annotated[float, Field(ge=1e-24, le=1e6)]
+Gain = Annotated[float, Field(ge=0.0, le=1e6)]
+Decibel = Annotated[float, Field(ge=-100.0, le=100.0)]
+Exponent = Annotated[float, Field(ge=0.0, le=4.0)]
+"""Up to 4, where float32 still holds the gains over the longest distances."""
+
+Rate = Annotated[float, Field(ge=0.0, le=1e9)]
+Budget = Annotated[float, Field(ge=0.0, le=1e30)]
+Load = Annotated[float, Field(ge=0.0, le=1e12)]
+Slots = Annotated[int, Field(ge=1, le=10**6)]
 
 
-def _one_node(name: str, value: Any) -> tuple[Point, ...]:
-    """Accept the position of one node, also as a plain pair of coordinates."""
-    items = value.tolist() if hasattr(value, "tolist") else value
-    if isinstance(items, list | tuple) and items and all(map(_is_scalar, items)):
-        items = [items]
-    positions: tuple[Point, ...] = _points(name, items)
-    if len(positions) > 1:
-        raise InputError(rejection(name, value, "the position (x, y) of one node"))
-    return positions
+def _require_order(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError
+    return pair
 
 
-def _is_scalar(value: Any) -> bool:
-    return hasattr(value, "__float__") and not getattr(value, "ndim", 0)
+Range = Annotated[
+    tuple[Load, Load],
+    AfterValidator(_require_order),
+    Field(description="two numbers (low, high) with 0 <= low <= high"),
+]
+
+
+def _as_several(value: Any) -> Any:
+    """A plain pair of coordinates as the position of one node."""
+    pair = isinstance(value, tuple) and value and all(isinstance(x, int | float) for x in value)
+    return (value,) if pair else value
+
+
+OneNode = Annotated[
+    tuple[Point, ...],
+    BeforeValidator(_as_several),
+    Field(min_length=1, max_length=1, description="the position (x, y) of one node"),
+]
 
 
 @dataclass(frozen=True)
@@ -78,46 +98,39 @@ class Scenario(Parameters):
         10
     """
 
-    ue_positions: tuple[Point, ...] = parameter(_points, symbol="(x_u, y_u)", unit="m")
-    legitimate_position: Point = parameter(_point, (0.0, 0.0), symbol="(x_L, y_L)", unit="m")
-    eavesdropper_positions: tuple[Point, ...] = parameter(
-        _one_node, ((80.0, 80.0),), symbol="(x_E, y_E)", unit="m"
-    )
-    helper_starts: tuple[Point, ...] = parameter(
-        _one_node, ((-60.0, -60.0),), symbol="(x_H(0), y_H(0))", unit="m"
-    )
-    num_slots: int = parameter(_slots, 20, symbol="T")
-    slot_duration: float = parameter(_flown, 1.0, symbol="Delta", unit="s")
-    map_side: float = parameter(_length, 200.0, symbol="l_max", unit="m")
-    altitude: float = parameter(_length, 80.0, symbol="h", unit="m")
-    eavesdropper_altitude: float = parameter(_length, 120.0, symbol="h_e", unit="m")
-    coverage_radius: float = parameter(_radius, 45.0, symbol="D_max", unit="m")
-    max_speed: float = parameter(_flown, 20.0, symbol="v_max", unit="m/s")
-    speed_limit: str = parameter(choice("box", "disc"), "box")
-    off_map_penalty: float = parameter(_rate, 0.2, symbol="r_om", unit="bps/Hz")
-    helper_mass: float = parameter(_flown, 9.65, symbol="M", unit="kg")
-    ue_power: float = parameter(_power, 0.1, symbol="p_u", unit="W")
-    jamming_power: float = parameter(_power, 0.08, symbol="p_J", unit="W")
-    relay_power: float = parameter(_power, 0.012, symbol="p_R", unit="W")
-    noise_power: float = parameter(_noise, 1e-13, symbol="sigma^2", unit="W")
-    ground_to_air_gain: float = parameter(_gain, 1e-5, symbol="beta_0")
-    ground_to_air_exponent: float = parameter(_exponent, 2.0, symbol="alpha")
-    air_to_air_gain: float = parameter(_gain, 1e-4, symbol="beta_1")
-    ground_to_air_k_factor: float = parameter(_decibel, 12.0, symbol="K^G2A", unit="dB")
-    air_to_air_k_factor: float = parameter(_decibel, 20.0, symbol="K^A2A", unit="dB")
-    fading: bool = parameter(switch, True)
-    min_secrecy_rate: float = parameter(_rate, 0.1, symbol="epsilon", unit="bps/Hz")
-    task_size: tuple[float, float] = parameter(_range, (160e3, 240e3), symbol="S_u", unit="bit")
-    cycles_per_bit: tuple[float, float] = parameter(
-        _range, (1000.0, 1200.0), symbol="F_u", unit="cycle/bit"
-    )
-    capacitance: float = parameter(_capacitance, 1e-27, symbol="kappa")
-    ue_energy_budget: float = parameter(_budget, 0.025, symbol="E_u", unit="J")
-    edge_energy_budget: float = parameter(_budget, 24.0, symbol="E_L", unit="J")
-    helper_energy_budget: float = parameter(_budget, 3900.0, symbol="E_H", unit="J")
+    ue_positions: Points = parameter(symbol="(x_u, y_u)", unit="m")
+    legitimate_position: Point = parameter((0.0, 0.0), symbol="(x_L, y_L)", unit="m")
+    eavesdropper_positions: OneNode = parameter(((80.0, 80.0),), symbol="(x_E, y_E)", unit="m")
+    helper_starts: OneNode = parameter(((-60.0, -60.0),), symbol="(x_H(0), y_H(0))", unit="m")
+    num_slots: Slots = parameter(20, symbol="T")
+    slot_duration: Positive = parameter(1.0, symbol="Delta", unit="s")
+    map_side: Length = parameter(200.0, symbol="l_max", unit="m")
+    altitude: Length = parameter(80.0, symbol="h", unit="m")
+    eavesdropper_altitude: Length = parameter(120.0, symbol="h_e", unit="m")
+    coverage_radius: Radius = parameter(45.0, symbol="D_max", unit="m")
+    max_speed: Positive = parameter(20.0, symbol="v_max", unit="m/s")
+    speed_limit: Annotated[str, OneOf("box", "disc")] = parameter("box")
+    off_map_penalty: Rate = parameter(0.2, symbol="r_om", unit="bps/Hz")
+    helper_mass: Positive = parameter(9.65, symbol="M", unit="kg")
+    ue_power: Power = parameter(0.1, symbol="p_u", unit="W")
+    jamming_power: Power = parameter(0.08, symbol="p_J", unit="W")
+    relay_power: Power = parameter(0.012, symbol="p_R", unit="W")
+    noise_power: Noise = parameter(1e-13, symbol="sigma^2", unit="W")
+    ground_to_air_gain: Gain = parameter(1e-5, symbol="beta_0")
+    ground_to_air_exponent: Exponent = parameter(2.0, symbol="alpha")
+    air_to_air_gain: Gain = parameter(1e-4, symbol="beta_1")
+    ground_to_air_k_factor: Decibel = parameter(12.0, symbol="K^G2A", unit="dB")
+    air_to_air_k_factor: Decibel = parameter(20.0, symbol="K^A2A", unit="dB")
+    fading: bool = parameter(True)
+    min_secrecy_rate: Rate = parameter(0.1, symbol="epsilon", unit="bps/Hz")
+    task_size: Range = parameter((160e3, 240e3), symbol="S_u", unit="bit")
+    cycles_per_bit: Range = parameter((1000.0, 1200.0), symbol="F_u", unit="cycle/bit")
+    capacitance: Fraction = parameter(1e-27, symbol="kappa")
+    ue_energy_budget: Budget = parameter(0.025, symbol="E_u", unit="J")
+    edge_energy_budget: Budget = parameter(24.0, symbol="E_L", unit="J")
+    helper_energy_budget: Budget = parameter(3900.0, symbol="E_H", unit="J")
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         self._require_on_map("legitimate_position", self.legitimate_position)
         for name in ("eavesdropper_positions", "helper_starts", "ue_positions"):
             for index, position in enumerate(getattr(self, name)):

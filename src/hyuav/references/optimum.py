@@ -14,17 +14,19 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import torch
 import torch.nn.functional as F  # noqa: N812
+from pydantic import Field
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection
-from hyuav._support.parameters import choice, count, one_or_more
+from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked
 from hyuav.envs.arguments import as_scenario, as_seed
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.offloading import MODE_RULES, ModeRuleName
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.grid import Grid, Reach, best_flight, grid_over_map, values_to_go
@@ -37,7 +39,7 @@ MEMORY_LIMIT = 4 * 2**30
 """Bytes that the value tables may take."""
 
 
-_mode_rules = one_or_more(choice(*MODE_RULES), f"a list of {', '.join(MODE_RULES)}")
+_Draws = Annotated[int, Field(ge=2, le=LARGEST_COUNT)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,11 +175,11 @@ def solve_horizons(
         InputError: as :func:`solve_optimum`, and for horizons that are none or below 1.
     """
     scenario = as_scenario(scenario)
-    mode_rules = _mode_rules("mode_rules", mode_rules)
+    mode_rules = checked(OneOrMore[ModeRuleName], "mode_rules", mode_rules)
     scenarios = _with_horizons(scenario, horizons)
     longest = max(scenarios)
-    draws = count(2)("draws", draws)
-    evaluation_draws = count(2)("evaluation_draws", evaluation_draws)
+    draws = checked(_Draws, "draws", draws)
+    evaluation_draws = checked(_Draws, "evaluation_draws", evaluation_draws)
     require_resolution(resolution, scenario.map_side, longest)
     root = torch.Generator().manual_seed(as_seed(seed))
     map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root).tolist()

@@ -11,7 +11,7 @@ from omegaconf import OmegaConf
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.files import create_durably
-from hyuav._support.parameters import read_yaml
+from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import PLAIN, Compare, parameters_of, training_episodes
 from hyuav.experiments.comparison.shards import Shard
@@ -101,7 +101,7 @@ class ComparisonDirectory:
     def _unsaid(self) -> dict[str, Any]:
         """Entries that older comparisons may not name; what they did not know was off."""
         plain = {
-            f"hyperparameters.{entry}": ALGORITHMS[PLAIN[name]]().to_dict()
+            f"hyperparameters.{entry}": ALGORITHMS[PLAIN.get(name, name)]().to_dict()
             for entry in self.options.entries
             if (name := entry.partition("-")[0]) != PEER
         }

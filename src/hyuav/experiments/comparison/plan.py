@@ -3,31 +3,35 @@
 import dataclasses
 import itertools
 import math
-from dataclasses import dataclass
+from typing import Annotated
 
-from hyuav._support.errors import InputError, rejection
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.machine import cores, require_installed
 from hyuav._support.parameters import (
-    Converter,
+    Count,
+    CountOrZero,
+    Fraction,
+    OneOf,
+    OneOrMore,
     Parameters,
-    choice,
-    count,
-    number,
-    one_or_more,
+    Text,
+    Threads,
+    ZeroOrMore,
     parameter,
-    text,
-    thread_count,
 )
 from hyuav.experiments.comparison.ray import LOCAL
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.registry import ALGORITHMS, PEER
+from hyuav.learning.registry import ALGORITHMS, PEER, find, is_reference, names
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
-from hyuav.physics.offloading import MODE_RULES
-from hyuav.physics.scenario import PRESETS, Scenario
+from hyuav.physics.offloading import MODE_RULES, ModeRuleName
+from hyuav.physics.scenario import Preset, Scenario
 
 ENTRIES = (*ALGORITHMS, PEER)
 """What can be compared."""
@@ -51,55 +55,48 @@ ENGINES = ("processes", "ray")
 LAYOUT = "layout-"
 """With its seed behind, the name of a random layout's scenario."""
 
-
-def _any(convert: Converter) -> Converter:
-    """Accept an empty list too."""
-    return lambda name, value: () if value in ([], ()) else convert(name, value)
-
-
-_presets = _any(one_or_more(choice(*PRESETS), f"a list of {', '.join(PRESETS)}"))
-_pieces = _any(one_or_more(choice(*PIECES), f"a list of {', '.join(PIECES)}"))
+Entry = Annotated[Text, Field(description=f"one of {', '.join(ENTRIES)}, FILE.py:CLASS")]
+Piece = Annotated[str, OneOf(*PIECES)]
 
 
 @dataclass(frozen=True)
 class Compare(Parameters):
     """What is compared, and how the work is divided."""
 
-    algorithm: tuple[str, ...] = parameter(
-        one_or_more(choice(*ENTRIES), "algorithms"), ("ddpg", "ddpg_robust", "td3", "sac")
-    )
-    without: tuple[str, ...] = parameter(_pieces, ())
+    algorithm: OneOrMore[Entry] = parameter(("ddpg", "ddpg_robust", "td3", "sac"))
+    without: ZeroOrMore[Piece] = parameter(())
     """Pieces of a variant, such as ``clock``: it is compared once more for each, without it."""
-    scenario: tuple[str, ...] = parameter(_presets, ("random_disk", "two_clusters"))
-    layouts: int = parameter(count(0, 100_000), 0)
+    scenario: ZeroOrMore[Preset] = parameter(("random_disk", "two_clusters"))
+    layouts: Annotated[int, Field(ge=0, le=100_000)] = parameter(0)
     """Random layouts, besides the presets; see :func:`hyuav.physics.layout.random_layout`."""
-    layouts_seed: int = parameter(count(0), 1000)
+    layouts_seed: CountOrZero = parameter(1000)
     """Of the first; the others follow."""
-    scheme: tuple[str, ...] = parameter(one_or_more(choice(*MODE_RULES), "schemes"), MODE_RULES)
-    num_slots: tuple[int, ...] = parameter(
-        one_or_more(count(), "numbers of slots"), (10, 20), symbol="T"
-    )
-    learners: int = parameter(count(1, 100_000), 10)
+    scheme: OneOrMore[ModeRuleName] = parameter(MODE_RULES)
+    num_slots: OneOrMore[Count] = parameter((10, 20), symbol="T")
+    learners: Annotated[int, Field(ge=1, le=100_000)] = parameter(10)
     """Of each algorithm, scenario, scheme and horizon; their seeds follow ``seed``."""
-    seed: int = parameter(count(0), 0)
-    threshold: float = parameter(number(0.0, 1.0), 0.97)
+    seed: CountOrZero = parameter(0)
+    threshold: Fraction = parameter(0.97)
     """Share of the optimum that counts as solved."""
-    shard_learners: int = parameter(count(), 60)
+    shard_learners: Count = parameter(60)
     """The most learners that one worker trains side by side: about 0.7 GB of them (U = 10)."""
-    engine: str = parameter(choice(*ENGINES), "processes")
+    engine: Annotated[str, OneOf(*ENGINES)] = parameter("processes")
     """What the workers are: processes of this machine, or those of Ray (extra ``cluster``)."""
-    address: str = parameter(text, LOCAL)
+    address: Text = parameter(LOCAL)
     """Of Ray: one that is started for the work, "auto" for one that runs here, or HOST:PORT."""
-    workers: int = parameter(thread_count, cores())
+    workers: Threads = parameter(cores())
     """That train at the same time, by default as many as cores; one process is this one. A Ray
     that runs has its own."""
-    retries: int = parameter(count(0), 2)
+    retries: CountOrZero = parameter(2)
     """How often a piece of work is begun again whose worker was lost, killed perhaps."""
-    output: str = parameter(text, "runs/${now:%Y-%m-%d_%H-%M-%S}_compare")
+    output: Text = parameter("runs/${now:%Y-%m-%d_%H-%M-%S}_compare")
     """Directory of the comparison, which may have been begun."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        for name in self.algorithm:
+            if is_reference(name):
+                find(name)
+            require_choice("algorithm", name, [*names(), PEER])
         for name in ("algorithm", "without", "scenario", "scheme", "num_slots"):
             values = getattr(self, name)
             if len(set(values)) < len(values):
@@ -155,7 +152,7 @@ def parameters_of(entry: str) -> AlgorithmParameters:
     parameters: AlgorithmParameters = ALGORITHMS[name]()
     if not hasattr(parameters, piece):
         return parameters
-    plain = getattr(ALGORITHMS[PLAIN[name]](), piece)
+    plain = getattr(ALGORITHMS[PLAIN.get(name, name)](), piece)
     return type(parameters).from_dict({**parameters.to_dict(), piece: plain})
 
 

@@ -22,7 +22,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LEARNED, OPTIMA
 from hyuav.experiments.tracking import LoggerParameters, in_group
 from hyuav.experiments.train import resume, train
-from hyuav.learning.registry import PEER
+from hyuav.learning.registry import PEER, file_name
 
 TABLES = RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
 
@@ -59,7 +59,7 @@ class Shard:
     def name(self) -> str:
         """Entry, scenario, horizon and part."""
         scenario, horizon = self.configuration.scenario_name, self.configuration.scenario.num_slots
-        return f"{self.entry}_{scenario}_T{horizon}{self.part}"
+        return f"{file_name(self.entry)}_{scenario}_T{horizon}{self.part}"
 
     @property
     def path(self) -> Path:

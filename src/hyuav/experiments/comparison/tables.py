@@ -12,7 +12,7 @@ from hyuav._support.terminal import print_line, print_table, results_table
 from hyuav.experiments.comparison.statistics import NEAR_OPTIMAL
 from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.metrics import finite_numbers
-from hyuav.learning.registry import PEER
+from hyuav.learning.registry import PEER, is_reference
 
 LABEL_WIDTH = 14
 """Of the column of the algorithms; longer names go on in the next line."""
@@ -28,6 +28,8 @@ def label(entry: str) -> str:
     algorithm, _, piece = entry.partition("-")
     if piece:
         return f"without {piece.replace('_', ' ')}"
+    if is_reference(algorithm):
+        return algorithm.rpartition(":")[2]
     acronym, *rest = algorithm.split("_")
     return " ".join([acronym.upper(), *rest])
 

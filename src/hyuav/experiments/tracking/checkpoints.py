@@ -5,16 +5,20 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field
 
 from hyuav._support.errors import InputError, harmless, rejection
-from hyuav._support.parameters import count, number, optional
+from hyuav._support.parameters import CountOrZero, NonNegativeNumber, checked
 from hyuav.experiments.metrics import MetricsPosition, remove_damaged_rows
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.experiments.tracking.parameters import identifier
+from hyuav.experiments.tracking.parameters import Identifier
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from hyuav.learning.state import require_entries, require_like
 from hyuav.learning.training import Training
+
+Checksum = Annotated[int, Field(ge=0, le=2**32 - 1)]
 
 
 @dataclass(frozen=True)
@@ -120,11 +124,11 @@ def _read(file: Path) -> _Found:
     require_entries("reported.metrics", metrics, ("size", "checksum"))
     reported = Reported(
         MetricsPosition(
-            count(0)("reported.metrics.size", metrics["size"]),
-            count(0, 2**32 - 1)("reported.metrics.checksum", metrics["checksum"]),
+            checked(CountOrZero, "reported.metrics.size", metrics["size"]),
+            checked(Checksum, "reported.metrics.checksum", metrics["checksum"]),
         ),
-        number(0.0)("reported.seconds", values["seconds"]),
-        optional(identifier)("reported.wandb_id", values["wandb_id"]),
+        checked(NonNegativeNumber, "reported.seconds", values["seconds"]),
+        checked(Identifier | None, "reported.wandb_id", values["wandb_id"]),
     )
     return _Found(file, content["training"], reported)
 

@@ -1,18 +1,12 @@
 """What Weights & Biases is told of a run, checked before anything is computed."""
 
-from dataclasses import dataclass
-from typing import Any
+import re
+from typing import Annotated
 
-from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import (
-    Converter,
-    Parameters,
-    choice,
-    one_or_more,
-    optional,
-    parameter,
-    text,
-)
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from hyuav._support.parameters import OneOf, Parameters, Text, ZeroOrMore, parameter
 
 MODES = ("offline", "online", "disabled")
 LONGEST, LONGEST_TAG = 128, 64
@@ -21,46 +15,44 @@ LONGEST, LONGEST_TAG = 128, 64
 RESERVED = "/\\#?%:"
 
 
-def _label(longest: int, reserved: str = "") -> Converter:
-    """Accept text of limited length without some characters."""
-    accepted = f"text of at most {longest} characters"
-    if reserved:
-        accepted += f" without {' '.join(reserved)}"
+NAME = f"text of at most {LONGEST} characters"
 
-    def convert(name: str, value: Any) -> str:
-        label = text(name, value)
-        if len(label) > longest or any(character in label for character in reserved):
-            raise InputError(rejection(name, value, accepted))
-        return label
-
-    return convert
-
-
-identifier = _label(LONGEST, f"{RESERVED};,'")
-"""Accept what a W&B run can be known by."""
-
-_tags = one_or_more(_label(LONGEST_TAG), "a list of tags")
-
-
-def _any_tags(name: str, value: Any) -> Any:
-    return () if value in ([], ()) else _tags(name, value)
+Label = Annotated[Text, Field(max_length=LONGEST, description=NAME)]
+Owner = Annotated[
+    Label,
+    Field(
+        pattern=f"^[^{re.escape(RESERVED)}]*$",
+        description=f"{NAME} without {' '.join(RESERVED)}",
+    ),
+]
+Identifier = Annotated[
+    Label,
+    Field(
+        pattern=f"^[^{re.escape(RESERVED)};,']*$",
+        description=f"{NAME} without {' '.join(RESERVED)} ; , '",
+    ),
+]
+"""What a W&B run can be known by."""
+Tag = Annotated[
+    Text, Field(max_length=LONGEST_TAG, description=f"text of at most {LONGEST_TAG} characters")
+]
 
 
 @dataclass(frozen=True)
 class LoggerParameters(Parameters):
     """Where the metrics go besides the run directory; what is None is chosen for the user."""
 
-    mode: str = parameter(choice(*MODES), "offline")
-    project: str = parameter(_label(LONGEST, RESERVED), "hyuav")
-    entity: str | None = parameter(optional(_label(LONGEST, RESERVED)), None)
+    mode: Annotated[str, OneOf(*MODES)] = parameter("offline")
+    project: Owner = parameter("hyuav")
+    entity: Owner | None = parameter(None)
     """The user or team; None for that of the account."""
-    group: str | None = parameter(optional(_label(LONGEST)), None)
-    job_type: str | None = parameter(optional(_label(LONGEST)), None)
+    group: Label | None = parameter(None)
+    job_type: Label | None = parameter(None)
     """"train", "evaluate" or "comparison" where it is None."""
-    name: str | None = parameter(optional(_label(LONGEST)), None)
+    name: Label | None = parameter(None)
     """The directory's where it is None."""
-    tags: tuple[str, ...] = parameter(_any_tags, ())
-    id: str | None = parameter(optional(identifier), None)
+    tags: ZeroOrMore[Tag] = parameter(())
+    id: Identifier | None = parameter(None)
     """Of the run, which is continued if there is one."""
 
 
@@ -71,4 +63,4 @@ AS_TRAINED = "as_trained"
 class EvaluationLoggerParameters(LoggerParameters):
     """The same for an evaluation, which by default is logged where the training was."""
 
-    mode: str = parameter(choice(AS_TRAINED, *MODES), AS_TRAINED)
+    mode: Annotated[str, OneOf(AS_TRAINED, *MODES)] = parameter(AS_TRAINED)

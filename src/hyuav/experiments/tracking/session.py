@@ -19,8 +19,9 @@ from rich.console import Console
 
 from hyuav._support.errors import harmless
 from hyuav._support.files import read_regular, write_durably
+from hyuav._support.parameters import checked
 from hyuav._support.terminal import print_line
-from hyuav.experiments.tracking.parameters import LoggerParameters, identifier
+from hyuav.experiments.tracking.parameters import Identifier, LoggerParameters
 
 MEMORY_FILE = "wandb.json"
 """In a run directory, which W&B run it belongs to."""
@@ -231,7 +232,7 @@ def remembered(directory: Path) -> dict[str, Any]:
     try:
         content = json.loads(read_regular(file, LARGEST_MEMORY).decode())
         identity = {name: content[name] for name in IDENTITY}
-        identifier("id", identity["id"])
+        checked(Identifier, "id", identity["id"])
         LoggerParameters.from_dict(identity)
     except FileNotFoundError:
         return {}

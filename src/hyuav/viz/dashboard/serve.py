@@ -4,11 +4,13 @@ import importlib.util
 import ipaddress
 import os
 import socket
-from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic.dataclasses import dataclass
+
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import Parameters, count, parameter, switch, text
+from hyuav._support.parameters import Count, Parameters, Text, ZeroOrMore, parameter
+from hyuav.experiments.own_algorithms import OwnAlgorithm
 
 APP = Path(__file__).with_name("app.py")
 
@@ -19,12 +21,14 @@ LIBRARIES = ("streamlit", "plotly")
 class Dashboard(Parameters):
     """What the dashboard shows, and where."""
 
-    runs: str = parameter(text, "runs")
+    runs: Text = parameter("runs")
     """The directory of the runs; it may be filled later."""
-    port: int = parameter(count(), 8501)
-    address: str = parameter(text, "127.0.0.1")
+    algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
+    """Their own algorithms; a run's directory names a file, but only you let it be run."""
+    port: Count = parameter(8501)
+    address: Text = parameter("127.0.0.1")
     """Of the network interface to be reached by; the default is this machine alone."""
-    open: bool = parameter(switch, False)
+    open: bool = parameter(False)
     """Whether to open a browser."""
 
 

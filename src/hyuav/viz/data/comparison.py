@@ -15,7 +15,7 @@ from hyuav.experiments.comparison.plan import ENTRIES, LAYOUT, PIECES, Compare
 from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.experiments.comparison.statistics import performance_profiles
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
-from hyuav.learning.registry import PEER
+from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.viz.data.reading import readable_config, readable_table
 
 _OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
@@ -38,7 +38,9 @@ def entry_color(entry: str) -> str:
     piece = entry.partition("-")[2]
     if piece in PIECES:
         return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]]
-    return _UNKNOWN if piece else ENTRY_COLORS.get(entry, _UNKNOWN)
+    own = list(ALGORITHMS).index(entry) if entry in ALGORITHMS else None
+    known = _UNKNOWN if own is None else OKABE_ITO[_OTHERS[own % len(_OTHERS)]]
+    return _UNKNOWN if piece else ENTRY_COLORS.get(entry, known)
 
 
 def entry_line(entry: str) -> int:

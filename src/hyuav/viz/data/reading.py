@@ -11,7 +11,7 @@ import pandas as pd
 
 from hyuav._support.errors import InputError
 from hyuav._support.files import read_parquet
-from hyuav._support.parameters import read_yaml
+from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.experiments.schemes import LABELS, OPTIMA
 

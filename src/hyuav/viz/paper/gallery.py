@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Annotated
 
 import pandas as pd
 from matplotlib.figure import Figure
 from rich.console import Console
 
 from hyuav._support.errors import InputError
+from hyuav._support.parameters import OneOf
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS
@@ -77,6 +79,8 @@ FIGURES: dict[str, Drawing] = {
     "animation": _animation,
 }
 """By their names; the first three are the paper's."""
+
+FigureName = Annotated[str, OneOf(*FIGURES)]
 
 
 def draw(run: RunDirectory, names: Sequence[str] | None, console: Console) -> None:
