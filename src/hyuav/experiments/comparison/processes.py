@@ -1,6 +1,5 @@
 """Independent pieces of work, several at a time, of which one that fails stops no other."""
 
-import itertools
 import logging
 import multiprocessing
 import os
@@ -68,17 +67,16 @@ class Workers:
             yield begun[done], done.result()
 
     def _elsewhere(self, function: Callable[[Piece], None], piece: Piece) -> str | None:
-        process = self._idle.get()
+        process, tries = self._idle.get(), 0
         try:
-            for tries in itertools.count(1):
+            while tries <= self._retries and not self._is_ending:
+                tries += 1
                 try:
                     return process.submit(attempt, function, piece).result()
                 except (BrokenProcessPool, KeyboardInterrupt, SystemExit):  # of the worker
                     process.shutdown()
                     process = _process()
-                    if tries > self._retries or self._is_ending:
-                        return "its process was killed" + (f", {tries} times" * (tries > 1))
-            raise AssertionError("it counts for ever")
+            return "its process was killed" + (f", {tries} times" * (tries > 1))
         finally:
             self._idle.put(process)
 

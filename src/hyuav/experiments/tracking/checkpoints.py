@@ -73,7 +73,7 @@ def restore(run: RunDirectory, begin: Callable[[], Training]) -> tuple[Training,
         OSError: the run cannot be written to.
     """
     _require_files(run)
-    whole: list[_Found] = []
+    without_metrics: list[_Found] = []
     reasons: list[str] = []
     for file in (run.last_checkpoint, run.previous_checkpoint):
         try:
@@ -82,18 +82,18 @@ def restore(run: RunDirectory, begin: Callable[[], Training]) -> tuple[Training,
             reasons.append(f"{file.name}: {error}")
             continue
         if not found.reported.metrics.is_in(run.metrics_file):
-            whole.append(found)
+            without_metrics.append(found)
             reasons.append(f"{run.metrics_file}: not what it was at the time of {file.name}")
             continue
-        training = _gone_on(found, begin, reasons)
+        training = _resumed(found, begin, reasons)
         if training is not None:
-            _take(found, run, training, reasons)
+            _adopt(found, run, training, reasons)
             return training, found.reported
-    for found in whole:
-        training = _gone_on(found, begin, reasons)
+    for found in without_metrics:
+        training = _resumed(found, begin, reasons)
         if training is not None:
             reasons.append(f"{run.metrics_file}: its damaged rows are lost")
-            _take(found, run, training, reasons)
+            _adopt(found, run, training, reasons)
             metrics = remove_damaged_rows(run.metrics_file, training.episode)
             return training, dataclasses.replace(found.reported, metrics=metrics)
     raise InputError(reasons[0])
@@ -133,7 +133,7 @@ def _read(file: Path) -> _Found:
     return _Found(file, content["training"], reported)
 
 
-def _gone_on(found: _Found, begin: Callable[[], Training], reasons: list[str]) -> Training | None:
+def _resumed(found: _Found, begin: Callable[[], Training], reasons: list[str]) -> Training | None:
     """A training of its own where the checkpoint left it; None where it does not fit, and why."""
     training = begin()
     try:
@@ -144,7 +144,7 @@ def _gone_on(found: _Found, begin: Callable[[], Training], reasons: list[str]) -
     return training
 
 
-def _take(found: _Found, run: RunDirectory, training: Training, reasons: list[str]) -> None:
+def _adopt(found: _Found, run: RunDirectory, training: Training, reasons: list[str]) -> None:
     """Go on from a checkpoint; what makes it another one than the last is told."""
     if found.file != run.last_checkpoint:
         found.file.replace(run.last_checkpoint)  # or the next one would replace it, not the bad one
