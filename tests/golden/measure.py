@@ -2,11 +2,13 @@
 
 Each part is measured, and its numbers are kept, by its name (in seconds of one core)::
 
-    python tests/golden/measure.py rewards       # 5: one slot at places all over the map
-    python tests/golden/measure.py rollouts      # 5: everything that environments tell
-    python tests/golden/measure.py trainings     # 50: every algorithm, slot by slot
-    python tests/golden/measure.py optima        # 20: the best flights
-    python tests/golden/measure.py compiled_rollouts compiled_trainings job     # minutes
+    python tests/golden/measure.py rewards             #   5: one slot, all over the map
+    python tests/golden/measure.py rollouts            #   5: all that environments tell
+    python tests/golden/measure.py trainings           #  35: every algorithm, slot by slot
+    python tests/golden/measure.py optima              #  10: the best flights
+    python tests/golden/measure.py compiled_rollouts   #  40
+    python tests/golden/measure.py compiled_trainings  # 120
+    python tests/golden/measure.py job                 #  20: the main job, as small as can be
 
 ``pytest tests/golden`` compares the first parts with what was kept, ``pytest -m slow tests/golden``
 the last three. Kept are SHA-256 digests of the bytes of tensors, whatever axes of length 1 they
@@ -50,6 +52,15 @@ ALGORITHMS: dict[str, tuple[str, dict[str, Any]]] = {
     "sac_robust": ("RobustSAC", ROBUST),
 }
 
+SHORT: dict[str, Any] = {
+    "num_episodes": 20,
+    "replay_size": 500,
+    "batch_size": 16,
+    "evaluation_every": 5,
+    "evaluation_episodes": 8,
+    "cohorts": 1,
+}
+
 JOB = (
     *("training.num_episodes=8", "training.batch_size=8", "training.evaluation_every=2"),
     *("training.evaluation_episodes=3", "training.compile=never", "training.cohorts=1"),
@@ -57,13 +68,6 @@ JOB = (
     *("candidates=2", "candidate_episodes=3", "evaluation.episodes=4", "evaluation.resolution=5"),
     *("scenario.num_slots=8", "figures=[learning_curves]", "hydra.run.dir=job"),
 )
-
-
-def best_flights(*arguments: Any, **options: Any) -> Any:
-    """The optima by scheme and horizon."""
-    from hyuav.schemes.optimum import solve_horizons
-
-    return solve_horizons(*arguments, **options)
 
 
 def digest(values: Tensor) -> str:
@@ -200,20 +204,11 @@ def compiled_trainings() -> dict[str, Any]:
 def training(name: str, compilation: str, **changes: Any) -> dict[str, Any]:
     """What a training of three learners reports, and the weights that it ends with."""
     cls, options = ALGORITHMS[name]
-    algorithm = getattr(hyuav, cls)(hidden_sizes=(48, 20), **options)
     trained = hyuav.Training(
         scenario("two_clusters", num_slots=10, **changes),
         [hyuav.Learner(mode, seed) for seed, mode in enumerate(MODES)],
-        algorithm,
-        hyuav.TrainingParameters(
-            num_episodes=20,
-            replay_size=500,
-            batch_size=16,
-            evaluation_every=5,
-            evaluation_episodes=8,
-            cohorts=1,
-            compile=compilation,
-        ),
+        getattr(hyuav, cls)(hidden_sizes=(48, 20), **options),
+        hyuav.TrainingParameters(**SHORT, compile=compilation),
     )
     episodes = list(trained.episodes())
     return {
@@ -222,11 +217,7 @@ def training(name: str, compilation: str, **changes: Any) -> dict[str, Any]:
             step: [numbers(episode.losses[step]) for episode in episodes]
             for step in episodes[0].losses
         },
-        "evaluations": [
-            {"reward": numbers(earned.reward), "sum rate": numbers(earned.sum_rate)}
-            for earned in (episode.evaluation for episode in episodes)
-            if earned is not None
-        ],
+        "evaluations": [list(map(numbers, episode.evaluation or ())) for episode in episodes],
         "best evaluation": numbers(trained.best_evaluation),
         "best weights": sorted(map(digest, trained.best_weights.values())),
         "state": {path: digest(values) for path, values in leaves(trained.state_dict())},
@@ -247,12 +238,12 @@ def leaves(state: Any, path: str = "") -> Iterator[tuple[str, Tensor]]:
 
 def optima() -> dict[str, Any]:
     """Values and flights of the optima."""
+    from hyuav.schemes.optimum import solve_horizons
+
     measured: dict[str, Any] = {}
-    for preset, (fading, resolution) in product(PRESETS, ((False, 1.0), (True, 4.0))):
-        found = best_flights(
-            scenario(preset, fading=fading), (10, 20), MODES, resolution=resolution
-        )
-        measured[f"{preset}, fading {fading}, {resolution} m"] = {
+    for preset, (fading, spacing) in product(PRESETS, ((False, 1.0), (True, 4.0))):
+        found = solve_horizons(scenario(preset, fading=fading), (10, 20), MODES, resolution=spacing)
+        measured[f"{preset}, fading {fading}, {spacing} m"] = {
             f"{mode}, T = {num_slots}": {
                 "value": repr(optimum.value),
                 "standard error": repr(optimum.standard_error),
@@ -291,13 +282,6 @@ def measure(name: str) -> Any:
     return json.loads(json.dumps(PARTS[name]()))
 
 
-def only_weights(state: dict[str, str]) -> dict[str, str]:
-    """Of a training's state what is learned; how the rest is laid out does not matter."""
-    weights = {path: value for path, value in state.items() if ".modules." in path}
-    assert weights
-    return weights
-
-
 def main(names: Sequence[str]) -> None:
     """Measure parts and keep their numbers."""
     golden = json.loads(GOLDEN.read_text()) if GOLDEN.exists() else {}
@@ -305,8 +289,9 @@ def main(names: Sequence[str]) -> None:
     for name in names or PARTS:
         golden[name] = measure(name)
         if name.endswith("trainings"):
-            for measured in golden[name].values():
-                measured["state"] = only_weights(measured["state"])
+            for measured in golden[name].values():  # of the state, what is learned
+                state = measured["state"].items()
+                measured["state"] = {path: own for path, own in state if ".modules." in path}
         GOLDEN.write_text(json.dumps(golden, indent=1) + "\n")
 
 

@@ -19,6 +19,10 @@ def differences(kept: Any, measured: Any, place: str = "") -> Iterator[str]:
     What has another name now is found by its content, among what is told beside it. Weights may
     be anywhere in a training's state, and what is told in parts need not be told as a whole.
     """
+    if isinstance(kept, list) and isinstance(measured, list) and len(kept) == len(measured):
+        for index, (value, found) in enumerate(zip(kept, measured, strict=True)):
+            yield from differences(value, found, f"{place} {index}")
+        return
     if not isinstance(kept, dict) or not isinstance(measured, dict):
         if kept != measured:
             yield f"{place}: {kept} became {measured}"
