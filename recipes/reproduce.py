@@ -45,8 +45,8 @@ from hyuav.experiments.experiment import (
 )
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.physics.slot import SCHEMES

@@ -38,7 +38,7 @@ from hyuav.experiments.configuration import (
 from hyuav.experiments.experiment import resume, saved_weights, train_or_resume
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
-from hyuav.learning.cohort import Learner
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.slot import SCHEMES
 from hyuav.viz.html.page import write_run_report

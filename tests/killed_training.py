@@ -16,8 +16,8 @@ from hyuav.experiments.experiment import resume, train
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.checkpoint import load_checkpoint
-from hyuav.learning.cohort import Learner
-from hyuav.learning.robust import RobustDDPG
+from hyuav.learning.guide.robust import RobustDDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 OFF = LoggerParameters(mode="disabled")

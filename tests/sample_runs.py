@@ -14,8 +14,8 @@ from hyuav.experiments.evaluation import EvaluationParameters, evaluate
 from hyuav.experiments.experiment import learned_policies, reference_policies, train
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=12)

@@ -18,8 +18,8 @@ from omegaconf import OmegaConf
 
 from hyuav._support.errors import InputError
 from hyuav._support.parameters import Converter, Parameters
-from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS, BUILT_IN
+from hyuav.learning.train import Learner
 from hyuav.physics.scenario import PRESETS, Scenario
 
 RECIPES = Path(__file__).parents[2] / "recipes"
@@ -59,8 +59,7 @@ def configuration_page() -> str:
         parts += [f"## `algorithm={name}`", f"[`{path}`][{path}]", table(parameters)]
     parts += [
         "## `learners`",
-        "In a run's `config.yaml`, and in Python: "
-        "[`hyuav.Learner`][hyuav.learning.cohort.Learner].",
+        "In a run's `config.yaml`, and in Python: [`hyuav.Learner`][hyuav.learning.train.Learner].",
         table(Learner),
     ]
     return "\n\n".join(parts) + "\n"

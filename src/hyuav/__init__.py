@@ -7,12 +7,12 @@ import gymnasium
 from hyuav._support.errors import InputError, InputTypeError
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.envs.transforms import make_env
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.robust import RobustDDPG, RobustSAC, RobustTD3
 from hyuav.learning.registry import OWN_FILES, register, run_own_files
-from hyuav.learning.robust import RobustDDPG, RobustSAC, RobustTD3
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.physics.scenario import Scenario
 

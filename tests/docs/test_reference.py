@@ -8,8 +8,8 @@ from api import ROOMS, modules, pages
 from configuration import accepted, configuration_page, descriptions, recipes_page, table
 from hyuav import Learner, Scenario
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.robust import RobustDDPG
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.robust import RobustDDPG
 from hyuav.learning.training import TrainingParameters
 
 ROOT = Path(__file__).parents[2]

@@ -18,8 +18,8 @@ from hyuav.experiments.experiment import (
 )
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)

@@ -16,8 +16,8 @@ from hyuav import Scenario
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import Reported, save_checkpoints
 from hyuav.learning.checkpoint import load_checkpoint
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from killed_training import differences, outcome, process, small
 

@@ -14,10 +14,10 @@ from hyuav.experiments.run_directory import (
     named_scenario,
     readable_metrics,
 )
-from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 
 CONFIGURATION = RunConfiguration(

@@ -27,9 +27,9 @@ from hyuav.experiments.experiment import learned_policy, resume, saved_weights, 
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.checkpoint import FORMAT, load_checkpoint, save_checkpoint
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.robust import RobustSAC
+from hyuav.learning.guide.robust import RobustSAC
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0), (-3.0, 4.0)), num_slots=2)

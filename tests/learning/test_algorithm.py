@@ -10,8 +10,8 @@ from torch import Tensor
 
 from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithm import Algorithm
-from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
 
 NAMES = sorted(ALGORITHMS)

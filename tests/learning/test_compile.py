@@ -10,8 +10,8 @@ import torch
 
 from hyuav import InputError, Scenario
 from hyuav.learning import training as training_module
-from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.physics.slot import SCHEMES
 

@@ -13,7 +13,7 @@ import pytest
 from benchmarks import plan
 from faults import leave_overflowing
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.learning.robust import RobustDDPG
+from hyuav.learning.guide.robust import RobustDDPG
 from recipe_calls import TINY_COMPARISON, Call, Refusal
 
 Printed = pytest.CaptureFixture[str]

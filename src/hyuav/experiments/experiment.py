@@ -18,8 +18,8 @@ from hyuav.experiments.tracking import LoggerParameters, Tracker
 from hyuav.experiments.tracking.checkpoints import Reported, first_checkpoint, restore
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file
-from hyuav.learning.cohort import Learner
 from hyuav.learning.policy import LearnedPolicy
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Episode, Training
 from hyuav.learning.weights import count_learners, join_learners, select_learner
 from hyuav.physics.scenario import Scenario

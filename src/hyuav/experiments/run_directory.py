@@ -22,8 +22,8 @@ from hyuav._support.parameters import mapping, read_yaml, sequence
 from hyuav.experiments.metrics import IDENTITY, parse_rows
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
-from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.physics.slot import SCHEMES

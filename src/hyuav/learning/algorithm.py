@@ -23,9 +23,9 @@ from hyuav.learning.guide.control_variate import ControlVariate
 from hyuav.learning.guide.demonstrations import BestFlights
 from hyuav.learning.guide.imitation import Alternatives
 from hyuav.learning.guide.reward_model import Expectation
+from hyuav.learning.guide.targets import raise_target
 from hyuav.learning.networks import ACTIVATIONS, make_critic
 from hyuav.learning.replay import Memory
-from hyuav.learning.targets import raise_target
 from hyuav.physics.scenario import Scenario
 
 learning_rate = number(0.0, 1.0)

@@ -14,7 +14,7 @@ from hyuav._support.errors import InputError, InputTypeError, brief, rejection
 from hyuav._support.parameters import count, number
 
 if TYPE_CHECKING:
-    from hyuav.learning.cohort import Cohort
+    from hyuav.learning.train import Cohort
 
 counted = count(0, 2**53)
 """Accept how many episodes, updates or draws there were: all float64 can tell apart."""

@@ -26,9 +26,9 @@ from hyuav._support.parameters import (
 from hyuav._support.recording import COMPILATION_ERRORS, has_compiler
 from hyuav.envs.arguments import as_device
 from hyuav.learning.algorithm import AlgorithmParameters
-from hyuav.learning.cohort import Cohort, Earned, Learner
 from hyuav.learning.memory import require_memory
 from hyuav.learning.state import require_entries, require_like, require_state
+from hyuav.learning.train import Cohort, Earned, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
 from hyuav.physics.scenario import Scenario
 
@@ -73,7 +73,7 @@ class TrainingParameters(Parameters):
 
 
 class Evaluation(NamedTuple):
-    """What all actors earn without noise; see :class:`hyuav.learning.cohort.Earned`."""
+    """What all actors earn without noise; see :class:`hyuav.learning.train.Earned`."""
 
     reward: Tensor
     """(N,) bps/Hz."""

@@ -8,10 +8,10 @@ from tensordict import TensorDict, TensorDictBase
 
 from hyuav import Scenario
 from hyuav.learning.algorithm import adam
-from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.control_variate import LUCK, ControlVariate
 from hyuav.learning.replay import FADING
+from hyuav.learning.train import Cohort, Learner
 from hyuav.physics.slot import SecureOffloadingSystem
 
 SCENARIO = Scenario.preset("random_disk")

@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from hyuav import InputError, Scenario
-from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.demonstrations import BestFlights
+from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)

@@ -10,13 +10,13 @@ from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 
 from hyuav import Scenario
-from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.control_variate import ControlVariate
 from hyuav.learning.guide.demonstrations import AHEAD, BestFlights
 from hyuav.learning.guide.planner import FlightSearch
 from hyuav.learning.guide.proposals import Imagination
 from hyuav.learning.guide.reward_model import Expectation
+from hyuav.learning.train import Cohort, Learner
 from hyuav.physics.slot import SecureOffloadingSystem
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)

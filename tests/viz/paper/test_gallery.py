@@ -14,8 +14,8 @@ from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.experiment import train
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.viz.paper.gallery import AS_IN_PAPER, FIGURES, draw, horizon_directory
 

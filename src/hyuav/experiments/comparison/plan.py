@@ -21,9 +21,9 @@ from hyuav._support.parameters import (
 from hyuav.experiments.cluster import LOCAL, require_ray
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.learning.algorithm import AlgorithmParameters
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.registry import ALGORITHMS, PEER
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
 from hyuav.physics.scenario import PRESETS, Scenario

@@ -10,7 +10,7 @@ from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import OPTIMA, Evaluation, EvaluationParameters, Policy, evaluate
 from hyuav.experiments.experiment import LEARNED, learned_policy
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
-from hyuav.learning.cohort import Learner
+from hyuav.learning.train import Learner
 from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve
