@@ -8,6 +8,7 @@ from hyuav._support.errors import InputError, InputTypeError
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.envs.transforms import make_env
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.parameters import Guide
 from hyuav.learning.guide.robust import RobustDDPG, RobustSAC, RobustTD3
 from hyuav.learning.registry import OWN_FILES, register, run_own_files
 from hyuav.learning.sac import SAC
@@ -20,6 +21,7 @@ __all__ = [
     "DDPG",
     "SAC",
     "TD3",
+    "Guide",
     "InputError",
     "InputTypeError",
     "Learner",

@@ -74,7 +74,7 @@ def stage(directory: Path) -> str:
     episodes = run.configuration().training.num_episodes
     if first["episode"] == 0:
         return "before the first later checkpoint"
-    if first["episode"] <= run.configuration().algorithm.warm_up_episodes:
+    if first["episode"] <= run.configuration().algorithm.guide.warm_up_episodes:
         return "in the warm-up"
     return "after the last episode" if first["episode"] == episodes else "later"
 

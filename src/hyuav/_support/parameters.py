@@ -159,6 +159,21 @@ def sequence(element: Converter, accepted: str, *, length: int | None = None) ->
     return convert
 
 
+def record(kind: type["Parameters"]) -> Converter:
+    """Accept a record of this kind, or its fields by name."""
+
+    def convert(name: str, value: Any) -> "Parameters":
+        if isinstance(value, kind):
+            return value
+        try:
+            return kind.from_dict(mapping(name, value))
+        except InputError as error:
+            prefix = "" if str(error).startswith(name) else f"{name}."
+            raise type(error)(f"{prefix}{error}") from None
+
+    return convert
+
+
 def increasing_pair(low: float, high: float = math.inf) -> Converter:
     """Accept two numbers (first, last) with low <= first <= last <= high."""
     accepted = f"two numbers (low, high) with {low:g} <= low <= high"
@@ -286,10 +301,8 @@ class Parameters:
         return cls(**values)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values (numbers, strings, lists), as :meth:`from_dict` takes them."""
-        return {
-            field.name: _as_lists(getattr(self, field.name)) for field in dataclasses.fields(self)
-        }
+        """Plain values (numbers, strings, lists, dicts), as :meth:`from_dict` takes them."""
+        return {field.name: _plain(getattr(self, field.name)) for field in dataclasses.fields(self)}
 
     def save(self, path: str | Path) -> None:
         """Write the record as YAML."""
@@ -308,7 +321,7 @@ class Parameters:
             raise InputError(f"{cls.__name__.lower()} file {str(path)!r}: {error}") from None
 
 
-def _as_lists(value: Any) -> Any:
+def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
-        return [_as_lists(item) for item in value]
-    return value
+        return [_plain(item) for item in value]
+    return value.to_dict() if isinstance(value, Parameters) else value

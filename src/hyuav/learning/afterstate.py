@@ -7,9 +7,6 @@ from hyuav.envs.transforms import fenced
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import SecureOffloadingSystem
 
-BLUR = 0.02
-"""Of the coverage's edge, in units of the map's side; so that a gradient is felt beside it."""
-
 
 class Afterstate(nn.Module):
     """The state between an action and its slot's fading (Sutton and Barto, 2018, section 6.8).
@@ -24,12 +21,16 @@ class Afterstate(nn.Module):
 
     Args:
         scenario: its nodes, speed limit and map.
+        coverage_blur: how wide the edge of the coverage is shown, as a share of the map's side.
         clock: whether the slots flown are observed.
         geofence: whether flights are slowed to end on the map.
     """
 
-    def __init__(self, scenario: Scenario, *, clock: bool, geofence: bool) -> None:
+    def __init__(
+        self, scenario: Scenario, coverage_blur: float, *, clock: bool, geofence: bool
+    ) -> None:
         super().__init__()
+        self._blur = coverage_blur * scenario.map_side
         self._system = SecureOffloadingSystem(scenario, torch.get_default_device())
         self._norm_limit = self._system.norm_limit(["hybrid"])
         self._clock, self._geofence = clock, geofence
@@ -74,7 +75,7 @@ class Afterstate(nn.Module):
         features = [
             position / half_side,
             distances / half_side - 1.0,
-            torch.tanh(inside / (BLUR * scenario.map_side)),
+            torch.tanh(inside / self._blur),
             beside,
         ]
         return torch.cat([*features, clock] if self._clock else features, dim=-1)

@@ -1,15 +1,16 @@
-"""Learners of one horizon side by side: Algorithm 1, one episode at a time."""
+"""Algorithm 1 of the paper, for learners of one horizon side by side."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.collectors import Collector
 
+from hyuav._support.errors import InputError
 from hyuav._support.parameters import Parameters, choice, count, optional, parameter
 from hyuav._support.randomness import (
     RowStream,
@@ -19,14 +20,23 @@ from hyuav._support.randomness import (
     uniform,
 )
 from hyuav.envs.transforms import make_env
-from hyuav.learning.algorithm import AlgorithmParameters
-from hyuav.learning.compile import CompiledSlots, Flown, all_finite
-from hyuav.learning.guide.demonstrations import as_planned
-from hyuav.learning.guide.planner import FlightSearch
-from hyuav.learning.guide.proposals import Imagination
-from hyuav.learning.replay import clear_unused, forget, latest, make_replay
-from hyuav.learning.state import with_own_memory
+from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
+from hyuav.learning.checkpoint import (
+    begins_episode,
+    below_infinity,
+    copied,
+    counted,
+    draws_like,
+    finite_like,
+    optimizer_like,
+    require_like,
+)
+from hyuav.learning.compile import CompiledSlots, FlownEpisode, all_finite
+from hyuav.learning.policy import NoiseFreeReturn, fly_noise_free
+from hyuav.learning.replay import latest, make_replay
+from hyuav.learning.torchrl_internals import cursor_of, next_observation, set_filled
 from hyuav.learning.weights import (
+    begin_moments,
     copy_weights,
     draw_weights,
     finite_learners,
@@ -44,7 +54,7 @@ class Learner(Parameters):
 
     All its random numbers come from its seed: initial weights, exploration, fading, sampling. So
     it learns the same alone and among others, and learners of equal seeds that differ in scheme
-    or horizon begin with the same weights and meet the same luck.
+    or horizon begin with the same weights and meet the same fading.
     """
 
     scheme: str = parameter(choice(*SCHEMES), "hybrid")
@@ -53,26 +63,13 @@ class Learner(Parameters):
     """The horizon; the scenario's where it is None."""
 
 
-class Earned(NamedTuple):
-    """What actors earn without noise, on average over the same episodes."""
-
-    reward: Tensor
-    """(N,) bps/Hz, accumulated, with penalties; less the luck of these episodes, where the learner
-    has a control variate, so that flights are told apart that differ by less."""
-    sum_rate: Tensor
-    """(N,) bps/Hz, the accumulated secrecy sum-rate alone."""
-    way: Tensor
-    """(T, N, 2), where the actors flew in the first of the episodes, in units of half the map's
-    side."""
-
-
 class Cohort:
     """N learners that share a horizon and nothing else.
 
     Args:
         scenario: node positions and parameters, with the learners' horizon.
         learners: their schemes and seeds.
-        algorithm: which one, with its hyperparameters.
+        parameters: which algorithm, with its hyperparameters.
         replay_size: transitions kept of each learner.
         batch_size: K.
         device: of all tensors.
@@ -82,32 +79,29 @@ class Cohort:
         self,
         scenario: Scenario,
         learners: Sequence[Learner],
-        algorithm: AlgorithmParameters,
+        parameters: AlgorithmParameters,
         replay_size: int,
         batch_size: int,
         device: torch.device | str | None,
     ) -> None:
         self.scenario, self.learners = scenario, tuple(learners)
-        self._options = {"clock": algorithm.clock, "geofence": algorithm.geofence}
-        learning = {**self._options, "fading": algorithm.control_variate}
-        self.batch_size = batch_size
+        self._parameters, self._transitions = parameters, parameters.transitions
         seeds = [learner.seed for learner in learners]
         schemes = [learner.scheme for learner in learners]
-        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, **learning)
-        with self.env.device:
-            self.algorithm = algorithm.assemble(len(seeds), scenario)
-        draw_weights(self.algorithm.loss, seeds, "weights")
-        if self.algorithm.expectation is not None:
-            draw_weights(self.algorithm.expectation, seeds, "control variate")
-        self._streams = self._random_streams(seeds)
-        self._search = self._flight_search(schemes, seeds)
-        self.replay = make_replay(
-            replay_size,
-            batch_size,
-            self._streams["sampling"],
-            self.env.device,
+        self.env = make_env(
+            scenario, schemes, (len(seeds),), device, seeds, **parameters.environment
         )
-        self.episode = self.updates = 0
+        # Line 1: actor mu, critic Q, their targets and the replay buffer B.
+        with self.env.device:
+            algorithm = parameters.build(len(seeds), scenario)
+        draw_weights(algorithm.loss, seeds, "weights")
+        self.algorithm = parameters.guided(algorithm, self.env, seeds)
+        for step in self.algorithm.steps:
+            begin_moments(step.optimizer)
+        self._streams = self._random_streams(seeds, batch_size)
+        self.stored = self._transitions.allocate(self.env, replay_size)
+        self.replay = make_replay(self.stored, batch_size, self._streams["sampling"])
+        # Lines 4 to 11 are the environment's: the collector brings a slot each time it is asked.
         self.collector = Collector(
             self.env,
             self._explore,
@@ -117,18 +111,18 @@ class Cohort:
             track_traj_ids=False,
             auto_register_policy_transforms=False,
         )
-        self._transitions = iter(self.collector)
+        self._collected = iter(self.collector)
         self._compiled: CompiledSlots | None = None
+        self.episode = self.updates = 0
         self.best_evaluation = torch.full((len(seeds),), -torch.inf, device=self.env.device)
         self.best_weights = copy_weights(self.algorithm.loss)
         self.stopped = torch.zeros(len(seeds), dtype=torch.int64, device=self.env.device)
 
-    def _random_streams(self, seeds: Sequence[int]) -> dict[str, RowStream]:
-        size, normals = self.batch_size, sum(step.normals for step in self.algorithm.steps)
+    def _random_streams(self, seeds: Sequence[int], batch_size: int) -> dict[str, RowStream]:
         laws = {
-            "exploration": (standard_normal, (self.algorithm.parameters.explorer_normals, 2)),
-            "sampling": (uniform, (size,)),
-            "losses": (standard_normal, (normals, size, 2)),
+            "exploration": (standard_normal, (self.algorithm.explorer_normals, 2)),
+            "sampling": (uniform, (batch_size,)),
+            "losses": (standard_normal, (self.algorithm.loss_normals, batch_size, 2)),
         }
         return {
             name: RowStream(law, shape, seeds, name, self.env.device)
@@ -136,38 +130,62 @@ class Cohort:
             if math.prod(shape)
         }
 
-    @property
-    def _all_streams(self) -> dict[str, RowStream]:
-        """Those that slots draw from, and those that the search draws from after an episode."""
-        return self._streams | (self._search.streams if self._search else {})
+    def fly(self) -> FlownEpisode:
+        """Fly and learn for one episode.
 
-    def _flight_search(self, schemes: Sequence[str], seeds: Sequence[int]) -> FlightSearch | None:
-        flights, expectation = self.algorithm.best_flights, self.algorithm.expectation
-        if flights is None or expectation is None:
-            return None
-        imagined = self.algorithm.parameters.imagined_flights
-        system = self.env.base_env.system
-        imagination = Imagination(imagined, system, schemes) if imagined else None
-        return FlightSearch(flights, expectation, imagination, seeds)
+        A learner whose losses, reward or weights are no longer finite stops: ``stopped`` (N,) is
+        the slot, counted from the first of training, 0 for those that go on. Its numbers do not
+        count any more.
+        """
+        guide, slots = self.algorithm.guide, self.scenario.num_slots
+        self.episode += 1
+        guide.begin_episode(self.episode)
+        flown = self._fly_compiled() if self.is_compiled else self._fly_slots()
+        last = self.stored[latest(self.replay, slots)]
+        guide.end_episode(self.episode, last, self.stored[: len(self.replay)])
+        self._stop_where_not_finite(flown)
+        return flown
 
-    def _explore(self, tensordict: TensorDictBase) -> TensorDictBase:
+    def _fly_slots(self) -> FlownEpisode:
+        """Lines 2 to 17, slot by slot."""
+        reward = torch.zeros(len(self.learners), device=self.env.device)
+        unbroken = torch.ones_like(self.stopped, dtype=torch.bool)
+        finite = torch.zeros_like(self.stopped)
+        losses: list[dict[str, Tensor]] = []
+        for _ in range(self.scenario.num_slots):
+            slot = next(self._collected)[:, 0]  # lines 3 to 11
+            self.replay.extend(self._transitions.transition(slot).unsqueeze(0))  # line 12
+            losses.append({})
+            if len(self.replay) >= self.replay.batch_size:
+                batch = self.replay.sample()  # line 13
+                self.updates += 1
+                losses[-1] = self._update_networks(batch)  # line 14
+                update_targets(self.algorithm, self.updates)  # line 15
+            reward += slot["next", "reward"].squeeze(-1)
+            unbroken &= all_finite((reward, *losses[-1].values()))
+            finite += unbroken
+        return FlownEpisode(reward, _mean(losses), finite)
+
+    def _explore(self, observed: TensorDictBase) -> TensorDictBase:
+        """Line 5: the action of the actor, and noise."""
         with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
-            tensordict = self.algorithm.explorer(tensordict)
-        if not self.algorithm.parameters.repeat_every:
-            return tensordict
-        return as_planned(tensordict, self._plan()[int(tensordict["step_count"][0])])
+            return self.algorithm.explorer(observed)
 
-    def _plan(self) -> Tensor:
-        """Actions (T, N, 2) that are taken whatever the explorer says, NaN where there are none."""
-        flights = self.algorithm.best_flights
-        assert flights is not None
-        planned = flights.tried_actions
-        return planned if self.algorithm.repeats(self.episode) else planned * torch.nan
+    def _update_networks(self, batch: TensorDictBase) -> dict[str, Tensor]:
+        if "losses" not in self._streams:
+            return update_networks(self.algorithm, batch, self.updates)
+        with given_normals(iter(next(self._streams["losses"]).unbind(dim=1))):
+            return update_networks(self.algorithm, batch, self.updates)
 
     @property
     def learns(self) -> bool:
         """Whether every slot of the next episode is followed by an update."""
-        return len(self.replay) + 1 >= self.batch_size
+        return len(self.replay) + 1 >= self.replay.batch_size
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether the next episode is flown by compiled programs."""
+        return self._compiled is not None
 
     def compile(self) -> None:
         """Fly from the next episode on by compiled programs; see :class:`CompiledSlots`.
@@ -179,48 +197,26 @@ class Cohort:
             self._compiled = CompiledSlots(
                 self.env,
                 self.algorithm,
+                self._transitions,
                 self.replay,
-                self.batch_size,
-                self.collector._carrier,
+                self.stored,
+                self._observed(),
             )
 
-    @property
-    def is_compiled(self) -> bool:
-        """Whether the next episode is flown by compiled programs."""
-        return self._compiled is not None
-
-    def fly(self) -> Flown:
-        """Fly and learn for one episode.
-
-        A learner whose losses, reward or weights are no longer finite stops: ``stopped`` (N,) is
-        the slot, counted from the first of training, 0 for those that go on. Its numbers do not
-        count any more.
-        """
-        self.episode += 1
-        flown = self._fly_slots() if self._compiled is None else self._fly_compiled(self._compiled)
-        self._keep_flight()
-        self._stop_where_not_finite(flown)
+    def _fly_compiled(self) -> FlownEpisode:
+        assert self._compiled is not None
+        slots = self.scenario.num_slots
+        flown = self._compiled.fly(self._observed(), self._streams, slots, self.updates)
+        self.updates += slots
+        next_observation(self.collector).update(self.env.reset())
         return flown
 
-    def _keep_flight(self) -> None:
-        """Keep the episode's flight where it is the best so far, or one that is better still.
+    def _observed(self) -> TensorDictBase:
+        """What the helpers observe before the next slot, (N,)."""
+        names = (*self.env.observation_spec.keys(), *self.env.done_keys)
+        return next_observation(self.collector).select(*names)
 
-        It counts what it earned; or where it is known, what is to be expected of it.
-        """
-        flights = self.algorithm.best_flights
-        if flights is None:
-            return
-        storage = self.replay.storage._storage
-        flown = storage[latest(self.replay, self.scenario.num_slots)]
-        if self._search is not None:
-            imagines = self.episode >= self.algorithm.parameters.warm_up_episodes
-            self._search.go_on(flown, storage[: len(self.replay)], self.episode, imagines=imagines)
-            return
-        way = flown["next", "observation"][..., :2]
-        flights.keep(flown["action"], way, flown["next", "reward"].sum(dim=(0, 2)))
-        flights.try_best()
-
-    def _stop_where_not_finite(self, flown: Flown) -> None:
+    def _stop_where_not_finite(self, flown: FlownEpisode) -> None:
         slots = self.scenario.num_slots
         finite = finite_learners(self.algorithm.loss) & (flown.finite == slots)
         slot = (self.episode - 1) * slots + (flown.finite + 1).clamp(max=slots)
@@ -232,52 +228,9 @@ class Cohort:
             load_weights(self.algorithm.loss, own)
             for step in self.algorithm.steps:
                 forget_moments(step.optimizer, where)
-            forget(self.replay, where)
+            self.stored[:, where] = 0
 
-    def _fly_compiled(self, compiled: CompiledSlots) -> Flown:
-        slots, draws = self.scenario.num_slots, self.env.base_env.draws
-        blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
-        if self.algorithm.parameters.repeat_every:
-            blocks["plan"] = self._plan()
-        if self.scenario.fading:
-            blocks["fading"] = draws.take_fading(slots).contiguous()  # where rows are shared
-        if self.env.base_env.system.edge_can_saturate:
-            blocks["tasks"] = draws.take_tasks(slots).contiguous()
-        carrier = self.collector._carrier
-        flown = compiled.fly(carrier, blocks, self.updates)
-        self.updates += slots
-        carrier.update(self.env.reset())
-        return flown
-
-    def _fly_slots(self) -> Flown:
-        reward = torch.zeros(len(self.learners), device=self.env.device)
-        unbroken = torch.ones_like(self.stopped, dtype=torch.bool)
-        finite = torch.zeros_like(self.stopped)
-        losses: list[dict[str, Tensor]] = []
-        for _ in range(self.scenario.num_slots):
-            transition = next(self._transitions)[:, 0]
-            reward += transition["next", "reward"].squeeze(-1)
-            self.replay.extend(self.algorithm.parameters.memory.transition(transition).unsqueeze(0))
-            losses.append(self._learn() if len(self.replay) >= self.batch_size else {})
-            unbroken &= all_finite((reward, *losses[-1].values()))
-            finite += unbroken
-        return Flown(reward, _mean(losses), finite)
-
-    def _learn(self) -> dict[str, Tensor]:
-        """Lines 13 to 15 of Algorithm 1; the collector has gone through lines 3 to 11."""
-        batch = self.replay.sample()
-        self.updates += 1
-        if "losses" in self._streams:
-            normals = next(self._streams["losses"]).unbind(dim=1)
-            with given_normals(iter(normals)):
-                losses = self.algorithm.update_networks(batch, self.updates)
-        else:
-            losses = self.algorithm.update_networks(batch, self.updates)
-        self.algorithm.update_targets(self.updates)
-        return losses
-
-    @torch.no_grad()
-    def evaluate(self, episodes: int, seed: int, scheme: str | None = None) -> Earned:
+    def evaluate(self, episodes: int, seed: int, scheme: str | None = None) -> NoiseFreeReturn:
         """Fly the current actors without noise, all of them through the same fading.
 
         Args:
@@ -285,49 +238,49 @@ class Cohort:
             seed: of the fading.
             scheme: that all learners fly; None for each learner's own.
         """
-        expectation = self.algorithm.expectation
+        return self._fly_noise_free(episodes, seed, scheme)[0]
+
+    def keep_best(self, episodes: int, seed: int) -> NoiseFreeReturn:
+        """Evaluate; where a learner never earned more, its weights are the best.
+
+        Args:
+            episodes: flown by each learner.
+            seed: of the fading.
+        """
+        earned, positions = self._fly_noise_free(episodes, seed, None)
+        better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
+        self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
+        replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
+        self.algorithm.guide.end_evaluation(positions)
+        return earned
+
+    def _fly_noise_free(
+        self, episodes: int, seed: int, scheme: str | None
+    ) -> tuple[NoiseFreeReturn, Tensor]:
         env = make_env(
             self.scenario,
             self.env.base_env.schemes if scheme is None else scheme,
             (len(self.learners), episodes),
             self.env.device,
             [derived_seed(seed, "evaluation")] * len(self.learners),
-            fading=expectation is not None,
-            **self._options,
+            **self._parameters.environment,
         )
-        off_map, luck = torch.zeros(2, len(self.learners), device=env.device)
-        state, way = env.reset(), []
-        for _ in range(self.scenario.num_slots):
-            slot = env.step(self.algorithm.actor(state))
-            if expectation is not None:
-                luck += expectation.variate.luck(slot).mean(dim=(1, 2))
-            state = env.step_mdp(slot)
-            off_map += state["off_map"].squeeze(-1).float().mean(dim=-1)
-            way.append(state["observation"][:, 0, :2])
-        reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
-        sum_rate = reward + self.scenario.off_map_penalty * off_map
-        fair = reward - luck / self.algorithm.parameters.reward_scale
-        return Earned(fair, sum_rate, torch.stack(way))
-
-    def keep_best(self, earned: Earned) -> None:
-        """Where a learner never earned more than ``earned``, its weights are the best."""
-        flights = self.algorithm.best_flights
-        better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
-        self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
-        replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
-        if flights is not None:
-            flights.own_way.copy_(earned.way)
+        return fly_noise_free(env, self.algorithm, self._parameters.reward_scale)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that evolves; the tensors are the cohort's own."""
-        clear_unused(self.replay)
+        guide = self.algorithm.guide
         return {
             "modules": self.algorithm.modules.state_dict(),
             "optimizers": [step.optimizer.state_dict() for step in self.algorithm.steps],
-            "replay": self.replay.state_dict(),
-            "slot": self.collector._carrier.to_dict(),  # where the flight stands
+            "replay": self.stored.flatten_keys(".").to_dict(),
+            "replay_length": len(self.replay),
+            "replay_cursor": cursor_of(self.replay),
+            "slot": self._observed().to_dict(),  # where the flight stands
             "environment": self.env.base_env.draws.state(),
-            "random": {name: stream.state() for name, stream in self._all_streams.items()},
+            "random": {
+                name: stream.state() for name, stream in {**self._streams, **guide.streams}.items()
+            },
             "episode": self.episode,
             "updates": self.updates,
             "best_evaluation": self.best_evaluation,
@@ -335,28 +288,89 @@ class Cohort:
             "stopped": self.stopped,
         }
 
+    def require_state(self, name: str, state: Any) -> None:
+        """Accept what :meth:`state_dict` gave of a cohort made with the same arguments.
+
+        Args:
+            name: of the state, for errors.
+            state: to be taken up by :meth:`load_state_dict`.
+
+        Raises:
+            InputError: it differs from this cohort's own; the line names the entry.
+        """
+        own, capacity = self.state_dict(), len(self.stored)
+        example = {
+            **own,
+            "optimizers": [optimizer_like(optimizer) for optimizer in own["optimizers"]],
+            "replay_length": count(0, capacity),
+            "replay_cursor": count(0, capacity - 1),
+            "slot": begins_episode(own["slot"]),
+            "environment": draws_like(own["environment"]),
+            "random": {key: draws_like(stream) for key, stream in own["random"].items()},
+            "episode": counted,
+            "updates": counted,
+            "best_evaluation": below_infinity(own["best_evaluation"]),
+            "best_weights": {key: finite_like(own) for key, own in self.best_weights.items()},
+        }
+        require_like(name, state, example)
+        flown = state["episode"] * self.scenario.num_slots
+        if not ((state["stopped"] >= 0) & (state["stopped"] <= flown)).all():
+            raise InputError(f"{name}.stopped: expected slots up to {flown}")
+
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue where :meth:`state_dict` was taken, in a cohort made with the same arguments.
 
         Args:
-            state: that :func:`hyuav.learning.state.require_state` accepts.
+            state: that :meth:`require_state` accepts.
         """
         self._compiled = None  # its programs hold the optimizers' former tensors
         self.algorithm.modules.load_state_dict(state["modules"])
         for step, optimizer in zip(self.algorithm.steps, state["optimizers"], strict=True):
-            step.optimizer.load_state_dict(with_own_memory(optimizer))
-        self.replay.load_state_dict(state["replay"])
-        self.collector._carrier.update(state["slot"])
+            step.optimizer.load_state_dict(copied(optimizer))
+        for name, values in self.stored.flatten_keys(".").items():
+            values.copy_(state["replay"][name])
+        set_filled(self.replay, state["replay_length"], state["replay_cursor"])
+        next_observation(self.collector).update(state["slot"])
         self.env.base_env.draws.set_state(state["environment"])
-        for name, stream in self._all_streams.items():
+        for name, stream in {**self._streams, **self.algorithm.guide.streams}.items():
             stream.set_state(state["random"][name])
         self.episode, self.updates = state["episode"], state["updates"]
         self.best_evaluation = state["best_evaluation"].to(self.env.device)
         self.stopped = state["stopped"].to(self.env.device)
         self.best_weights = {
             name: values.to(self.env.device)
-            for name, values in with_own_memory(state["best_weights"]).items()
+            for name, values in copied(state["best_weights"]).items()
         }
+
+
+def update_networks(algorithm: Algorithm, batch: TensorDictBase, index: int) -> dict[str, Tensor]:
+    """Line 14: take the gradient steps, eq. 9 and 10 for DDPG, on a mini-batch of each learner.
+
+    Args:
+        algorithm: of N learners.
+        batch: (N, K) transitions.
+        index: of this update, from 1, for the parts that are not taken every time.
+
+    Returns:
+        the mean loss (N,) of each step that was taken, by the step's name.
+    """
+    losses = {}
+    batch = algorithm.guide.prepare(batch)
+    for step, due in zip(algorithm.steps, algorithm.due(index), strict=False):
+        if not due:
+            continue
+        loss = step.loss(batch).mean(dim=-1)
+        step.optimizer.zero_grad()
+        loss.sum().backward()  # learners share no weight, so the sum keeps them apart
+        step.optimizer.step()
+        losses[step.name] = loss.detach()
+    return losses
+
+
+def update_targets(algorithm: Algorithm, index: int) -> None:
+    """Line 15: let the targets follow, in every ``target_every``-th update."""
+    if algorithm.due(index)[-1]:
+        algorithm.target.step()
 
 
 def _mean(losses: list[dict[str, Tensor]]) -> dict[str, Tensor]:

@@ -22,6 +22,8 @@ from hyuav.experiments.cluster import LOCAL, require_ray
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.parameters import OFF
+from hyuav.learning.guide.robust import Robust
 from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
@@ -35,15 +37,21 @@ ENTRIES = (*ALGORITHMS, PEER)
 PLAIN = {name: name.removesuffix("_robust") for name in ALGORITHMS}
 """The algorithm that each is a variant of."""
 
-PIECES = tuple(
-    dict.fromkeys(
+
+def _pieces(name: str) -> tuple[str, ...]:
+    """What distinguishes a variant from the algorithm that it is a variant of."""
+    own, plain = ALGORITHMS[name](), ALGORITHMS[PLAIN[name]]()
+    differing = [
         field.name
-        for name, plain in PLAIN.items()
-        for field in dataclasses.fields(ALGORITHMS[name])
-        if getattr(ALGORITHMS[name](), field.name) != getattr(ALGORITHMS[plain](), field.name)
-    )
-)
-"""Hyperparameters in which a variant differs from the algorithm that it is a variant of."""
+        for field in dataclasses.fields(plain)
+        if getattr(own, field.name) != getattr(plain, field.name)
+    ]
+    return (*differing, *(OFF if isinstance(own, Robust) else ()))
+
+
+PIECES = tuple(dict.fromkeys(piece for name in ALGORITHMS for piece in _pieces(name)))
+"""Hyperparameters in which a variant differs from the algorithm that it is a variant of, and the
+pieces of its guide."""
 
 ENGINES = ("processes", "ray")
 """What works the shards off."""
@@ -58,7 +66,7 @@ def _any(convert: Converter) -> Converter:
 
 
 _presets = _any(one_or_more(choice(*PRESETS), f"a list of {', '.join(PRESETS)}"))
-_pieces = _any(one_or_more(choice(*PIECES), f"a list of {', '.join(PIECES)}"))
+_without = _any(one_or_more(choice(*PIECES), f"a list of {', '.join(PIECES)}"))
 
 
 @dataclass(frozen=True)
@@ -68,7 +76,7 @@ class Compare(Parameters):
     algorithm: tuple[str, ...] = parameter(
         one_or_more(choice(*ENTRIES), "algorithms"), ("ddpg", "ddpg_robust", "td3", "sac")
     )
-    without: tuple[str, ...] = parameter(_pieces, ())
+    without: tuple[str, ...] = parameter(_without, ())
     """Pieces of a variant, such as ``clock``: it is compared once more for each, without it."""
     scenario: tuple[str, ...] = parameter(_presets, ("random_disk", "two_clusters"))
     layouts: int = parameter(count(0, 100_000), 0)
@@ -152,11 +160,12 @@ def parameters_of(entry: str) -> AlgorithmParameters:
     name, _, piece = entry.partition("-")
     if name == PEER:
         return DDPG()
-    parameters: AlgorithmParameters = ALGORITHMS[name]()
-    if not hasattr(parameters, piece):
-        return parameters
-    plain = getattr(ALGORITHMS[PLAIN[name]](), piece)
-    return type(parameters).from_dict({**parameters.to_dict(), piece: plain})
+    own, plain = ALGORITHMS[name](), ALGORITHMS[PLAIN[name]]()
+    if isinstance(own, Robust) and own.guide is not None and piece in OFF:
+        return dataclasses.replace(own, guide=own.guide.without(piece))
+    if not hasattr(plain, piece):
+        return own
+    return dataclasses.replace(own, **{piece: getattr(plain, piece)})
 
 
 def training_episodes(training: TrainingParameters) -> EvaluationParameters:

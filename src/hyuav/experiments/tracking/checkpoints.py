@@ -12,8 +12,12 @@ from hyuav._support.parameters import count, number, optional
 from hyuav.experiments.metrics_file import MetricsPosition, undamaged_metrics
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.tracking.parameters import identifier
-from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
-from hyuav.learning.state import require_entries, require_like
+from hyuav.learning.checkpoint import (
+    load_checkpoint,
+    require_entries,
+    require_like,
+    save_checkpoint,
+)
 from hyuav.learning.training import Training
 
 

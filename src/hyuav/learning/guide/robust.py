@@ -3,18 +3,26 @@
 What each piece is for, and how near to the optimum they come, is told in docs/results.md.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from hyuav._support.parameters import choice, count, number, parameter, switch
-from hyuav.learning.algorithm import AlgorithmParameters, learning_rate
+from torchrl.envs import TransformedEnv
+
+from hyuav._support.parameters import choice, number, optional, parameter, record, switch
+from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, learning_rate
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.planner import Planner
+from hyuav.learning.guide.reward_model import feature_count
+from hyuav.learning.memory import Need
+from hyuav.learning.replay import FADING, TransitionOptions
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
 
 
 @dataclass(frozen=True)
 class Robust(AlgorithmParameters):
-    """What the variants have in common."""
+    """What the variants have in common; with any algorithm it makes a variant of that."""
 
     actor_learning_rate: float = parameter(learning_rate, 3e-4)
     critic_learning_rate: float = parameter(learning_rate, 3e-4)
@@ -24,12 +32,42 @@ class Robust(AlgorithmParameters):
     reward_scale: float = parameter(number(above=0.0), 0.05)
     layer_norm: bool = parameter(switch, True)
     afterstate: bool = parameter(switch, True)
-    warm_up_episodes: int = parameter(count(0), 100)
-    repeat_every: int = parameter(count(0), 4)
-    control_variate: bool = parameter(switch, True)
-    imagined_flights: int = parameter(count(0, 100_000), 64)
-    action_stretch: float = parameter(number(1.0, 2.0), 1.04)
-    alternatives_weight: float = parameter(number(0.0, 1e6), 0.1)
+    action_scale: float = parameter(number(1.0, 2.0), 1.04)
+    guide: Guide | None = parameter(optional(record(Guide)), Guide())
+    """What guides the learners while they train; null for nothing."""
+
+    def guided(self, algorithm: Algorithm, env: TransformedEnv, seeds: Sequence[int]) -> Algorithm:
+        """See :meth:`AlgorithmParameters.guided`."""
+        if self.guide is None:
+            return algorithm
+        return Planner(self.guide, self, env, seeds).attach(algorithm)
+
+    def least_replay(self, num_slots: int) -> int:
+        """See :meth:`AlgorithmParameters.least_replay`: a flight, to keep the best."""
+        return num_slots if self.guide is not None and self.guide.keeps_flights else 1
+
+    @property
+    def transitions(self) -> TransitionOptions:
+        """See :attr:`AlgorithmParameters.transitions`: with the fading for a control variate."""
+        beside = (FADING,) if self.guide is not None and self.guide.control_variate else ()
+        return replace(super().transitions, beside=beside)
+
+    def needed_memory(
+        self, num_ues: int, horizons: Sequence[int], sizes: Mapping[str, int]
+    ) -> list[Need]:
+        """See :meth:`AlgorithmParameters.needed_memory`."""
+        needs, guide = super().needed_memory(num_ues, horizons, sizes), self.guide
+        if guide is None or not guide.control_variate:
+            return needs
+        hidden_size, most = guide.variate_hidden_sizes[-1], guide.most_ue_features
+        features = 3 * feature_count(num_ues, hidden_size, most)
+        stored, flights = sizes["replay_size"], guide.imagined_flights
+        remembered = len(horizons) * stored * (3 * num_ues + 2 + features)
+        return [
+            *needs,
+            Need("replay_size", stored, remembered),
+            Need("imagined_flights", flights, sum(horizons) * 2 * flights * features),
+        ]
 
 
 @dataclass(frozen=True)
@@ -48,7 +86,7 @@ class RobustTD3(RobustDDPG, TD3):
 
 @dataclass(frozen=True)
 class RobustSAC(Robust, SAC):
-    """SAC with the same pieces; its noise-free actor is stretched, what it explores with is not."""
+    """SAC with the same pieces; its noise-free actor is scaled, what it explores with is not."""
 
     temperature_init: float = parameter(number(1e-6, 1e6), 0.01)
     target_entropy: float = parameter(number(-100.0, 100.0), -4.0)
