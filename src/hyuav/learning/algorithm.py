@@ -159,9 +159,15 @@ class Guidance(nn.Module):
 
     streams: Mapping[str, RowStream] = {}
     """Of the random numbers that it draws, by name."""
+    plans: bool = False
+    """Whether it ever has a plan."""
 
-    def begin_episode(self, episode: int) -> None:
-        """Decide on the actions to be executed in an episode, counted from 1."""
+    def plan(self, episode: int) -> Tensor | None:  # noqa: ARG002
+        """Actions (T, N, 2) to execute in an episode, from 1, whatever the explorer says.
+
+        NaN where it is the explorer that acts; None where there never is a plan.
+        """
+        return None
 
     def prepare(self, batch: TensorDictBase) -> TensorDictBase:
         """A mini-batch (N, K) as the losses are to see it."""

@@ -22,6 +22,7 @@ from hyuav._support.randomness import RowStream, given_normals
 from hyuav._support.recording import compile_function
 from hyuav.envs.draws import GivenDraws
 from hyuav.learning.algorithm import Algorithm, GradientStep
+from hyuav.learning.exploration import as_planned
 from hyuav.learning.replay import TransitionOptions, sampled_slots
 from hyuav.learning.torchrl_internals import cursor_of, set_filled
 from hyuav.physics.slot import Tasks
@@ -93,7 +94,12 @@ class CompiledSlots:
         }
 
     def fly(
-        self, carrier: TensorDictBase, streams: Mapping[str, RowStream], slots: int, updates: int
+        self,
+        carrier: TensorDictBase,
+        streams: Mapping[str, RowStream],
+        plan: Tensor | None,
+        slots: int,
+        updates: int,
     ) -> FlownEpisode:
         """Fly and learn for some slots.
 
@@ -102,6 +108,7 @@ class CompiledSlots:
             streams: of random numbers: ``exploration`` (N, n, 2), standard normal, where the
                 explorer draws n times; ``sampling`` (N, K), uniform; ``losses`` (N, n, K, 2),
                 standard normal, where the losses draw n times. The environment has its own.
+            plan: see :meth:`hyuav.learning.algorithm.Guidance.plan`.
             slots: how many.
             updates: taken before.
         """
@@ -109,6 +116,8 @@ class CompiledSlots:
         counts = dict.fromkeys(self._adam, 0)
         draws = self._draws(streams, slots)
         blocks = {**draws, "corrections": self._corrections(updates, slots)}
+        if plan is not None:
+            blocks["plan"] = plan
         with torch.no_grad():
             rows = zip(*(blocks[name] for name in self._names), strict=True)
             for slot, inputs in enumerate(rows):
@@ -165,6 +174,8 @@ class CompiledSlots:
             "sampling": (learners, batch_size),
             "corrections": (len(self._adam), 2),
         }
+        if self._algorithm.guide.plans:
+            shapes["plan"] = (learners, 2)
         if normals:
             shapes["losses"] = (learners, normals, batch_size, 2)
         if system.scenario.fading:
@@ -194,7 +205,7 @@ class CompiledSlots:
         try:
             with given_normals(iter(given["exploration"].unbind(dim=1))):
                 action = self._algorithm.explorer(self._carrier.clone(False))
-            return env.step(action)
+            return env.step(as_planned(action, given["plan"]) if "plan" in given else action)
         finally:
             env.base_env.draws = draws
 

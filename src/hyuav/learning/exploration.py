@@ -3,6 +3,13 @@
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+
+
+def as_planned(tensordict: TensorDictBase, planned: Tensor) -> TensorDictBase:
+    """Take the planned actions (N, 2) in place of ``action``, where they are not NaN."""
+    tensordict["action"] = torch.where(planned.isnan(), tensordict["action"], planned)
+    return tensordict
 
 
 class GaussianNoise(TensorDictModuleBase):

@@ -32,6 +32,7 @@ from hyuav.learning.checkpoint import (
     require_like,
 )
 from hyuav.learning.compile import CompiledSlots, FlownEpisode, all_finite
+from hyuav.learning.exploration import as_planned
 from hyuav.learning.policy import NoiseFreeReturn, fly_noise_free
 from hyuav.learning.replay import latest, make_replay
 from hyuav.learning.torchrl_internals import cursor_of, next_observation, set_filled
@@ -101,6 +102,7 @@ class Cohort:
         self._streams = self._random_streams(seeds, batch_size)
         self.stored = self._transitions.allocate(self.env, replay_size)
         self.replay = make_replay(self.stored, batch_size, self._streams["sampling"])
+        self._plan: Tensor | None = None
         # Lines 4 to 11 are the environment's: the collector brings a slot each time it is asked.
         self.collector = Collector(
             self.env,
@@ -139,7 +141,7 @@ class Cohort:
         """
         guide, slots = self.algorithm.guide, self.scenario.num_slots
         self.episode += 1
-        guide.begin_episode(self.episode)
+        self._plan = guide.plan(self.episode)
         flown = self._fly_compiled() if self.is_compiled else self._fly_slots()
         last = self.stored[latest(self.replay, slots)]
         guide.end_episode(self.episode, last, self.stored[: len(self.replay)])
@@ -167,9 +169,12 @@ class Cohort:
         return FlownEpisode(reward, _mean(losses), finite)
 
     def _explore(self, observed: TensorDictBase) -> TensorDictBase:
-        """Line 5: the action of the actor, and noise."""
+        """Line 5: the action of the actor, and noise; or what a guide has planned."""
         with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
-            return self.algorithm.explorer(observed)
+            acted = self.algorithm.explorer(observed)
+        if self._plan is None:
+            return acted
+        return as_planned(acted, self._plan[int(acted["step_count"][0])])
 
     def _update_networks(self, batch: TensorDictBase) -> dict[str, Tensor]:
         if "losses" not in self._streams:
@@ -206,7 +211,8 @@ class Cohort:
     def _fly_compiled(self) -> FlownEpisode:
         assert self._compiled is not None
         slots = self.scenario.num_slots
-        flown = self._compiled.fly(self._observed(), self._streams, slots, self.updates)
+        observed, streams = self._observed(), self._streams
+        flown = self._compiled.fly(observed, streams, self._plan, slots, self.updates)
         self.updates += slots
         next_observation(self.collector).update(self.env.reset())
         return flown

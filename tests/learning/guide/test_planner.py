@@ -30,7 +30,7 @@ def updates(monkeypatch: pytest.MonkeyPatch) -> list[Tensor]:
     """The numbers by which a reward model that knows its answers was updated."""
     made: list[Tensor] = []
     monkeypatch.setattr(RewardModel, "judge", far_is_better)
-    monkeypatch.setattr(RewardModel, "update", lambda _, memory, normals: made.append(normals))
+    monkeypatch.setattr(RewardModel, "update", lambda *given: made.append(given[-1]))
     return made
 
 
@@ -59,9 +59,8 @@ def test_the_flight_of_which_most_is_expected_is_kept_and_planned(updates: list[
     assert len(updates) == 1
 
 
-def test_of_the_imagined_ones_the_best_is_kept_and_that_of_the_best_guess_planned(
-    updates: list[Tensor],
-) -> None:
+@pytest.mark.usefixtures("updates")
+def test_of_the_imagined_ones_the_best_is_kept_and_that_of_the_best_guess_planned() -> None:
     planning = planner(imagined=30)
     planning.end_episode(7, flown(-0.6), flown(-0.6))
     flights = planning.flights
@@ -72,7 +71,8 @@ def test_of_the_imagined_ones_the_best_is_kept_and_that_of_the_best_guess_planne
     torch.testing.assert_close(flights.best_return, flights.trajectory[..., 0].sum(dim=0))
 
 
-def test_nothing_is_imagined_during_the_warm_up(updates: list[Tensor]) -> None:
+@pytest.mark.usefixtures("updates")
+def test_nothing_is_imagined_during_the_warm_up() -> None:
     planning = planner(imagined=30)
     planning.guide = dataclasses.replace(planning.guide, warm_up_episodes=4)
     planning.end_episode(3, flown(-0.6), flown(-0.6))
@@ -80,8 +80,9 @@ def test_nothing_is_imagined_during_the_warm_up(updates: list[Tensor]) -> None:
     assert torch.equal(flights.planned_trajectory, flown(-0.6)["next", "observation"])
 
 
+@pytest.mark.usefixtures("updates")
 @pytest.mark.parametrize(
-    ("share", "behind"), [(1.0 - 2.0 * GUIDE.return_margin, True), (1.0, False)]
+    ("share", "behind"), [(1.0 - 2.0 * Guide().return_margin, True), (1.0, False)]
 )
 def test_who_flies_clearly_worse_than_the_best_flight_is_behind(share: float, behind: bool) -> None:
     planning = planner()
@@ -152,7 +153,7 @@ def test_a_flight_is_planned_in_the_episode_before_the_one_that_flies_it() -> No
     "off", [{"control_variate": False}, {"repeat_every": 0, "imitation_weight": 0.0}]
 )
 def test_flights_are_not_imagined_in_vain(off: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="^imagined_flights = 64: expected 0 without"):
+    with pytest.raises(InputError, match=r"^imagined_flights = 64: expected 0 without"):
         Guide(**off)  # type: ignore[arg-type]
 
 

@@ -14,6 +14,7 @@ from hyuav.physics.slot import SecureOffloadingSystem
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
 
 
+SCHEMES = ["hybrid", "relay"]
 DEAR = {"jamming_power": 1000.0}  # a helper that may jam has less left to fly
 SMALL = {
     "map_side": 60.0,
@@ -32,10 +33,14 @@ def flights(scenario: Scenario) -> Demonstrations:
     known.trajectory.copy_(start.expand_as(known.trajectory))
     reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
     known.planned_trajectory.copy_(known.trajectory)
-    known.planned_trajectory[..., 0] += (
-        0.5 * reach * torch.arange(1.0, scenario.num_slots + 1.0)[:, None]
-    )
+    slots = torch.arange(1.0, scenario.num_slots + 1.0)[:, None]
+    known.planned_trajectory[..., 0] += 0.5 * reach * slots
     return known
+
+
+def proposing(imagined: int, scenario: Scenario = SCENARIO) -> TrajectoryProposals:
+    system = SecureOffloadingSystem(scenario)
+    return TrajectoryProposals(Guide(imagined_flights=imagined), system, SCHEMES)
 
 
 def normals(imagined: int) -> torch.Tensor:
@@ -46,13 +51,10 @@ def normals(imagined: int) -> torch.Tensor:
 @pytest.mark.parametrize("geofence", [False, True])
 def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofence: bool) -> None:
     scenario = dataclasses.replace(SCENARIO, **changes)
-    schemes = ["hybrid", "relay"]
-    proposals = TrajectoryProposals(
-        Guide(imagined_flights=35), SecureOffloadingSystem(scenario), schemes
-    )
+    proposals = proposing(35, scenario)
     actions, trajectory = proposals.fly(3, flights(scenario), normals(35))
     assert actions.shape == trajectory.shape == (6, 2, 70, 2)
-    env = make_env(scenario, schemes, (2, 70), seed=0, geofence=geofence)
+    env = make_env(scenario, SCHEMES, (2, 70), seed=0, geofence=geofence)
     state, half_side = env.reset(), scenario.map_side / 2
     for action, place in zip(actions, trajectory, strict=True):
         state = env.step_mdp(env.step(state.set("action", action)))
@@ -64,9 +66,7 @@ def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofen
 
 def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_reached() -> None:
     scenario = dataclasses.replace(SCENARIO, num_slots=10)
-    proposals = TrajectoryProposals(
-        Guide(imagined_flights=50), SecureOffloadingSystem(scenario), ["hybrid", "hybrid"]
-    )
+    proposals = proposing(50, scenario)
     known, drawn = flights(scenario), normals(50)
     trajectories = [proposals.fly(episode, known, drawn)[1] for episode in range(40)]
     ends = torch.stack([trajectory[-1, 0, :50] for trajectory in trajectories]).flatten(0, 1)
@@ -76,9 +76,7 @@ def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_
 
 
 def test_variations_lead_beside_the_flights_that_they_vary() -> None:
-    proposals = TrajectoryProposals(
-        Guide(imagined_flights=400), SecureOffloadingSystem(SCENARIO), ["hybrid", "hybrid"]
-    )
+    proposals = proposing(400)
     known = flights(SCENARIO)
     _, trajectory = proposals.fly(1, known, normals(400))
     of_best, of_planned = trajectory[:, :, 400:600], trajectory[:, :, 600:]

@@ -79,9 +79,8 @@ def test_a_flight_is_worth_the_sum_of_its_slots() -> None:
     trajectory = torch.linspace(-0.3, 0.3, 5).reshape(5, 1, 1, 1).expand(5, 2, 3, 2)
     expected, guessed = regression.judge(trajectory)
     assert expected.shape == guessed.shape == (2, 3)
-    torch.testing.assert_close(
-        expected, earned(trajectory).squeeze(-1).sum(dim=0), atol=0.4, rtol=0.0
-    )
+    truth = earned(trajectory).squeeze(-1).sum(dim=0)
+    torch.testing.assert_close(expected, truth, atol=0.4, rtol=0.0)
 
 
 def test_guesses_differ_where_little_is_known() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase, TensorDictSequential
+from tensordict.nn import TensorDictSequential
 from torch import Tensor
 from torchrl.envs import TransformedEnv
 
@@ -25,34 +25,6 @@ from hyuav.learning.guide.proposals import TrajectoryProposals
 from hyuav.learning.guide.reward_model import RewardModel
 from hyuav.learning.guide.warm_up import WarmUp
 from hyuav.learning.weights import draw_weights
-from hyuav.physics.scenario import Scenario
-
-
-class PlannedActions(TensorDictModuleBase):
-    """Take planned actions in place of ``action``, where there are any.
-
-    Args:
-        learners: N.
-        scenario: that they fly.
-    """
-
-    in_keys = ("action", "step_count")
-    out_keys = ("action",)
-
-    actions: Tensor
-    """(T, N, 2) of an episode, NaN for none."""
-
-    def __init__(self, learners: int, scenario: Scenario) -> None:
-        super().__init__()
-        none = torch.full((scenario.num_slots, learners, 2), torch.nan)
-        self.register_buffer("actions", none, persistent=False)  # decided on for each episode
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Read ``action`` (N, 2) and ``step_count`` (N, 1), write the ``action``."""
-        slot = tensordict["step_count"].expand(-1, 2).unsqueeze(0)
-        planned = torch.take_along_dim(self.actions, slot, dim=0).squeeze(0)
-        tensordict["action"] = torch.where(planned.isnan(), tensordict["action"], planned)
-        return tensordict
 
 
 class Planner(Guidance):
@@ -77,11 +49,11 @@ class Planner(Guidance):
     ) -> None:
         super().__init__()
         self.guide, self._algorithm = guide, algorithm
+        self.plans = guide.repeat_every > 0
         self._env, self._seeds = env, seeds
         learners, self._scenario = len(seeds), env.base_env.system.scenario
         with env.device:
             self.flights = Demonstrations(learners, self._scenario, guide.return_margin)
-            self.planned = PlannedActions(learners, self._scenario)
             self.reward_model = self._make_reward_model() if guide.control_variate else None
         if self.reward_model is not None:
             draw_weights(self.reward_model, seeds, "control variate")
@@ -118,8 +90,6 @@ class Planner(Guidance):
         if guide.warm_up_episodes:
             with self._env.device:
                 explorers.append(WarmUp(len(self._seeds), guide, self._scenario))
-        if guide.repeat_every:
-            explorers.append(self.planned)
         if guide.imitation_weight:
             clock, discount = self._algorithm.clock, self._algorithm.discount
             imitation = Imitation(algorithm, self.flights, guide, clock=clock)
@@ -137,12 +107,12 @@ class Planner(Guidance):
             guide=self,
         )
 
-    def begin_episode(self, episode: int) -> None:
-        """Have the planned flight executed in the episodes that repeat one."""
-        if self.guide.repeats(episode):
-            self.planned.actions.copy_(self.flights.planned_actions)
-        else:
-            self.planned.actions.fill_(torch.nan)
+    def plan(self, episode: int) -> Tensor | None:
+        """The planned flight, in the episodes that take one."""
+        if not self.plans:
+            return None
+        planned = self.flights.planned_actions
+        return planned if self.guide.repeats(episode) else planned * torch.nan
 
     def prepare(self, batch: TensorDictBase) -> TensorDictBase:
         """Take off the rewards what is known to be chance."""
