@@ -1,6 +1,6 @@
 """The paper's Algorithm 1 on one screen, from TorchRL's parts alone: copy it, and change it.
 
-python algorithm1.py
+python recipes/algorithm1.py
 """
 
 import torch

@@ -29,7 +29,8 @@ def transition(learners: int, slot: int) -> TensorDictBase:
 def replay_of(learners: int, capacity: int, batch_size: int) -> ReplayBuffer:
     uniforms = iter(lambda: torch.rand(learners, batch_size), None)
     kept = TransitionOptions().transition(transition(learners, 0))
-    return make_replay(torch.zeros_like(kept.expand(capacity, learners)), batch_size, uniforms)
+    slots = torch.zeros_like(kept.expand(capacity, learners)).to("cpu")
+    return make_replay(slots, batch_size, uniforms)
 
 
 @pytest.mark.parametrize("length", [1, 7, 8000])

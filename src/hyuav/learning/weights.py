@@ -74,8 +74,8 @@ def _mask(where: Tensor, values: Tensor) -> Tensor:
     return where.reshape(-1, *(1,) * (min(values.ndim, 3) - 1))
 
 
-def begin_moments(optimizer: torch.optim.Adam) -> None:
-    """Give Adam the state that it would make in its first step."""
+def begin_moments(optimizer: torch.optim.Optimizer) -> None:
+    """Give an optimizer of Adam's kind the state that it would make in its first step."""
     for group in optimizer.param_groups:
         for weight in group["params"]:
             optimizer.state[weight] = {
