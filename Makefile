@@ -6,7 +6,7 @@ INSTALL := $(PYTHON) -m venv $(VENV) && \
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
 ARGS ?=
 FIGURES := also=random_disk
-QUICK := seeds=2 num_slots=[10,15,20] training.num_episodes=45 algorithm.warm_up_episodes=30 \
+QUICK := seeds=2 num_slots=[10,15,20] training.num_episodes=45 algorithm.guide.warm_up_episodes=30 \
 	candidates=2 candidate_episodes=10 evaluation.episodes=200 evaluation.resolution=2
 
 .PHONY: help install setup reproduce figures figures-quick dashboard test test-slow lint format \

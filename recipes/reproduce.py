@@ -47,8 +47,8 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
 from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
 from hyuav.experiments.train import train_or_resume
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Preset, Scenario

@@ -42,8 +42,8 @@ from hyuav.experiments.initial_weights import saved_weights
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train_or_resume
-from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import is_reference
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.offloading import ModeRuleName
 from hyuav.viz.html.page import write_report

@@ -16,8 +16,9 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train
 from hyuav.learning.checkpoint import load_checkpoint
-from hyuav.learning.cohort import Learner
-from hyuav.learning.robust import RobustDDPG
+from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.robust import RobustDDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 OFF = LoggerParameters(mode="disabled")
@@ -33,7 +34,7 @@ def small(compile_slots: str, num_episodes: int = 12) -> RunConfiguration:
         dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6),
         (Learner("hybrid", 3), Learner("relay", 3, 8), Learner("jamming", 4)),
         "ddpg_robust",
-        RobustDDPG(hidden_sizes=(16,), warm_up_episodes=3, actor_learning_rate=3e-3),
+        RobustDDPG(hidden_sizes=(16,), guide=Guide(warm_up_episodes=3), actor_learning_rate=3e-3),
         TrainingParameters(
             num_episodes=num_episodes,
             replay_size=40,

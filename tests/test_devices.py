@@ -38,8 +38,8 @@ def test_an_environment_keeps_to_its_device(options: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("name", list(ALGORITHMS))
 def test_a_training_keeps_to_its_device(name: str) -> None:
-    small = {"hidden_sizes": [8], "warm_up_episodes": 2 * name.endswith("_robust")}
-    algorithm = type(ALGORITHMS[name]()).from_dict({**ALGORITHMS[name]().to_dict(), **small})
+    guided = {"guide": {"warm_up_episodes": 2}} if name.endswith("_robust") else {}
+    algorithm = ALGORITHMS[name].from_dict({"hidden_sizes": [8], **guided})
     with torch.device("meta"):
         training = Training(SCENARIO, LEARNERS, algorithm, SHORT, "cpu")
         *_, last = training.episodes()

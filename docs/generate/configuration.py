@@ -20,8 +20,8 @@ from pydantic.fields import FieldInfo
 
 from hyuav._support.parameters import OrOne, Parameters, declared
 from hyuav._support.parameters import accepted as words
-from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS, BUILT_IN
+from hyuav.learning.train import Learner
 from hyuav.physics.scenario import PRESETS, Scenario
 
 RECIPES = Path(__file__).parents[2] / "recipes"
@@ -63,8 +63,7 @@ def configuration_page() -> str:
         parts += [f"## `algorithm={name}`", f"[`{path}`][{path}]", table(parameters)]
     parts += [
         "## `learners`",
-        "In a run's `config.yaml`, and in Python: "
-        "[`hyuav.Learner`][hyuav.learning.cohort.Learner].",
+        "In a run's `config.yaml`, and in Python: [`hyuav.Learner`][hyuav.learning.train.Learner].",
         table(Learner),
     ]
     return "\n\n".join(parts) + "\n"
@@ -77,23 +76,32 @@ def table(parameters: type[Parameters], defaults: dict[str, Any] | None = None) 
         parameters: the record.
         defaults: where they differ from the record's own.
     """
+    rows = [("name", "default", "accepted", "unit", "symbol", "meaning")]
+    rows += _rows(parameters, defaults)
+    filled = [column for column in zip(*rows, strict=True) if any(column[1:])]
+    lines = [" | ".join(row).join(("| ", " |")) for row in zip(*filled, strict=True)]
+    return "\n".join([lines[0], "|---" * len(filled) + "|", *lines[1:]])
+
+
+def _rows(
+    parameters: type[Parameters], defaults: dict[str, Any] | None, owner: str = ""
+) -> Iterator[tuple[str, ...]]:
+    """The rows of a record's fields, and after a field that is a record, those of its fields."""
     documented = descriptions(parameters)
     annotations = get_type_hints(parameters, include_extras=True)
-    rows = [("name", "default", "accepted", "unit", "symbol", "meaning")]
     for field in fields(parameters):
         own = field.default if defaults is None else defaults[field.name]
-        cells = (
-            f"`{field.name}`",
-            "required" if own is MISSING else f"`{_shown(own)}`",
+        inner = isinstance(own, Parameters)
+        yield (
+            f"`{owner}{field.name}`",
+            "required" if own is MISSING else "its own" if inner else f"`{_shown(own)}`",
             accepted(annotations[field.name]),
             field.metadata["unit"],
             _symbol(field.metadata["symbol"]),
             documented.get(field.name, ""),
         )
-        rows.append(cells)
-    filled = [column for column in zip(*rows, strict=True) if any(column[1:])]
-    lines = [" | ".join(row).join(("| ", " |")) for row in zip(*filled, strict=True)]
-    return "\n".join([lines[0], "|---" * len(filled) + "|", *lines[1:]])
+        if inner:
+            yield from _rows(type(own), None, f"{owner}{field.name}.")
 
 
 def accepted(annotation: Any) -> str:
@@ -153,6 +161,8 @@ def _symbol(name: str) -> str:
 def _recipe(path: Path) -> list[str]:
     module = _load(path)
     purpose, _, calls = (module.__doc__ or "").partition("\n\n")
+    if f"{path.stem}.yaml" not in ConfigStore.instance().repo:  # nothing of it can be set
+        return [f"## `{path.name}`", purpose, f"```sh\n{calls.strip()}\n```"]
     stored = OmegaConf.to_container(ConfigStore.instance().load(f"{path.stem}.yaml").node)
     assert isinstance(stored, dict)
     node: dict[str, Any] = {str(name): value for name, value in stored.items()}

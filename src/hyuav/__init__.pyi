@@ -13,14 +13,15 @@ from hyuav.experiments.evaluation import EvaluationParameters as EvaluationParam
 from hyuav.experiments.evaluation import Policy as Policy
 from hyuav.experiments.evaluation import evaluate as evaluate
 from hyuav.experiments.run_directory import load as load
-from hyuav.learning.cohort import Learner as Learner
 from hyuav.learning.ddpg import DDPG as DDPG
+from hyuav.learning.guide.parameters import Guide as Guide
+from hyuav.learning.guide.robust import RobustDDPG as RobustDDPG
+from hyuav.learning.guide.robust import RobustSAC as RobustSAC
+from hyuav.learning.guide.robust import RobustTD3 as RobustTD3
 from hyuav.learning.registry import register as register
-from hyuav.learning.robust import RobustDDPG as RobustDDPG
-from hyuav.learning.robust import RobustSAC as RobustSAC
-from hyuav.learning.robust import RobustTD3 as RobustTD3
 from hyuav.learning.sac import SAC as SAC
 from hyuav.learning.td3 import TD3 as TD3
+from hyuav.learning.train import Learner as Learner
 from hyuav.learning.training import Training as Training
 from hyuav.learning.training import TrainingParameters as TrainingParameters
 from hyuav.physics.layout import clusters as clusters
@@ -28,7 +29,9 @@ from hyuav.physics.layout import disk as disk
 from hyuav.physics.layout import random_layout as random_layout
 from hyuav.physics.scenario import PRESETS as PRESETS
 from hyuav.physics.scenario import Scenario as Scenario
+from hyuav.physics.slot import slot as slot
 from hyuav.references.optimum import FlightPolicy as FlightPolicy
+from hyuav.references.optimum import solve_optimum as solve_optimum
 from hyuav.references.straight import ja_lt as ja_lt
 from hyuav.references.straight import re_lt as re_lt
 

@@ -7,11 +7,11 @@ from typing import get_type_hints
 
 from api import ROOMS, SHARED, modules, pages
 from configuration import accepted, configuration_page, descriptions, recipes_page, table
-from hyuav import Learner, Scenario
+from hyuav import Guide, Learner, Scenario
 from hyuav._support.parameters import OneOrMore, Parameters, Text, ZeroOrMore
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.robust import RobustDDPG
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.robust import RobustDDPG
 from hyuav.learning.training import TrainingParameters
 
 ROOT = Path(__file__).parents[2]
@@ -34,7 +34,14 @@ def test_every_field_of_scenario_algorithms_and_learners_has_a_row() -> None:
     assert set(parts) == set(named)
     for title, record in named.items():
         listed = [row[0] for row in rows(parts[title])]
-        assert listed == [f"`{field.name}`" for field in dataclasses.fields(record)]
+        own = [name for name in listed if "." not in name]
+        assert own == [f"`{field.name}`" for field in dataclasses.fields(record)]
+
+
+def test_a_guides_fields_follow_the_field_that_it_is() -> None:
+    listed = [row[0] for row in rows(sections(configuration_page())["algorithm=sac_robust"])]
+    guide = [f"`guide.{field.name}`" for field in dataclasses.fields(Guide)]
+    assert listed[listed.index("`guide`") + 1 :][: len(guide)] == guide
 
 
 def test_every_recipe_has_a_section_with_its_options() -> None:

@@ -61,7 +61,7 @@ def test_no_page_fetches_anything_from_elsewhere(site: Path) -> None:
 def test_docstrings_link_to_what_they_name(site: Path) -> None:
     page = (site / "reference" / "api" / "learning.html").read_text(encoding="utf-8")
     assert ":class:`" not in page
-    assert 'href="#hyuav.learning.exploration.WarmUp"' in page
+    assert 'href="#hyuav.learning.guide.warm_up.WarmUp"' in page
 
 
 def test_parameters_show_their_defaults(site: Path) -> None:

@@ -16,8 +16,8 @@ from hyuav import Scenario
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import Reported, save_checkpoints
 from hyuav.learning.checkpoint import load_checkpoint
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from killed_training import differences, outcome, process, small
 
@@ -74,7 +74,7 @@ def stage(directory: Path) -> str:
     episodes = run.configuration().training.num_episodes
     if first["episode"] == 0:
         return "before the first later checkpoint"
-    if first["episode"] <= run.configuration().algorithm.warm_up_episodes:
+    if first["episode"] <= run.configuration().algorithm.guide.warm_up_episodes:
         return "in the warm-up"
     return "after the last episode" if first["episode"] == episodes else "later"
 

@@ -10,10 +10,10 @@ from hyuav.experiments.run_directory import (
     named_algorithm,
     named_scenario,
 )
-from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 
 CONFIGURATION = RunConfiguration(

@@ -29,9 +29,10 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train
 from hyuav.learning.checkpoint import FORMAT, load_checkpoint, save_checkpoint
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.robust import RobustSAC
+from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.robust import RobustSAC
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0), (-3.0, 4.0)), num_slots=2)
@@ -174,12 +175,14 @@ def test_the_content_of_a_checkpoint_is_used_or_refused(tmp_path: Path) -> None:
     assert sum(TRIED[kind, outcome] for outcome in ("worked", "refused")) >= CASES[kind]
 
 
+SMALL = Guide(warm_up_episodes=1, update_every=2, repeat_every=2, imagined_flights=2)
+
 RESUMED = RunConfiguration(
     "custom",
     SCENARIO,
     (Learner("hybrid"), Learner("relay")),
     "sac_robust",
-    RobustSAC(hidden_sizes=(2,), warm_up_episodes=1, repeat_every=2, imagined_flights=2),
+    RobustSAC(hidden_sizes=(2,), guide=SMALL),
     dataclasses.replace(
         PARAMETERS, num_episodes=2, evaluation_every=1, evaluation_episodes=1, cohorts=1
     ),

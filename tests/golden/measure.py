@@ -40,7 +40,7 @@ PRESETS = ("two_clusters", "random_disk")
 MODES = ("hybrid", "relay", "jamming")
 BATCH, SLOTS = 8, 20
 
-ROBUST = {"warm_up_episodes": 6}
+ROBUST: dict[str, Any] = {"guide": {"warm_up_episodes": 6}}
 """So that everything that begins after the warm-up acts in a short training."""
 
 ALGORITHMS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -64,7 +64,7 @@ SHORT: dict[str, Any] = {
 JOB = (
     *("training.num_episodes=8", "training.batch_size=8", "training.evaluation_every=2"),
     *("training.evaluation_episodes=3", "training.compile=never", "training.cohorts=1"),
-    *("algorithm.hidden_sizes=[8]", "algorithm.warm_up_episodes=2", "logger.mode=disabled"),
+    *("algorithm.hidden_sizes=[8]", "algorithm.guide.warm_up_episodes=2", "logger.mode=disabled"),
     *("candidates=2", "candidate_episodes=3", "evaluation.episodes=4", "evaluation.resolution=5"),
     *("scenario.num_slots=8", "figures=[learning_curves]", "hydra.run.dir=job"),
 )

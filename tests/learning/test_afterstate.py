@@ -28,7 +28,7 @@ def test_it_is_what_the_environment_brings(
     env = make_env(scenario, "relay", (1,), seed=0, clock=clock, geofence=geofence)
     state = env.reset(env.reset().select("position").set("position", torch.tensor([[start]])))
     state["action"] = torch.tensor([action])
-    afterstate = Afterstate(scenario, clock=clock, geofence=geofence)
+    afterstate = Afterstate(scenario, 0.02, clock=clock, geofence=geofence)
     features = afterstate(state["observation"], state["action"])
     after = env.step(state)["next"]
     assert features.shape == (1, afterstate.size)
@@ -54,7 +54,7 @@ def test_a_gradient_leads_into_the_coverage() -> None:
     position = torch.tensor([26.0 + 46.0, -16.0])  # one metre outside that of a UE
     action = torch.zeros(1, 2, requires_grad=True)
     observation = torch.cat([position / 100.0, torch.zeros(13)]).unsqueeze(0)
-    features = Afterstate(SCENARIO, clock=False, geofence=False)(observation, action)
+    features = Afterstate(SCENARIO, 0.02, clock=False, geofence=False)(observation, action)
     ue = SCENARIO.ue_positions.index((26.0, -16.0))
     coverage = features[0, SCENARIO.num_ues + 4 + ue]
     assert -0.5 < coverage.item() < 0.0

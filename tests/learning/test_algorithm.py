@@ -10,8 +10,8 @@ from torch import Tensor
 
 from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithm import Algorithm
-from hyuav.learning.cohort import Cohort, Learner
 from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.train import Cohort, Learner, update_networks, update_targets
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
 
 NAMES = sorted(ALGORITHMS)
@@ -32,8 +32,8 @@ def train(algorithm: Algorithm, disturbance: float) -> dict[str, Tensor]:
         batch = mini_batch(3, 20)
         batch["next", "reward"][0] += disturbance
         batch["observation"][0] -= disturbance
-        algorithm.update_networks(batch, index)
-        algorithm.update_targets(index)
+        update_networks(algorithm, batch, index)
+        update_targets(algorithm, index)
     return copy_weights(algorithm.loss)
 
 
@@ -76,7 +76,7 @@ def test_the_actor_follows_what_the_explorer_learns(name: str) -> None:
     data = TensorDict(observation=torch.randn(2, 15), batch_size=[2])
     before = algorithm.actor(data.clone())["action"]
     for index in range(1, 5):
-        algorithm.update_networks(mini_batch(2, 20), index)
+        update_networks(algorithm, mini_batch(2, 20), index)
     assert not torch.equal(before, algorithm.actor(data.clone())["action"])
 
 

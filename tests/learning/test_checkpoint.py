@@ -101,6 +101,12 @@ def test_another_programs_checkpoint_is_refused(tmp_path: Path) -> None:
     assert "another program" in refusal(file)
 
 
+def test_a_checkpoint_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "last.pt"
+    torch.save({"format": "hyuav-checkpoint-1", "kind": "training", "content": {}}, file)
+    assert "of an earlier version and cannot be continued" in refusal(file)
+
+
 def test_a_checkpoint_of_another_kind_is_refused(tmp_path: Path) -> None:
     save_checkpoint(tmp_path / "best.pt", "weights", {})
     assert "'weights'" in refusal(tmp_path / "best.pt", "training")

@@ -10,8 +10,10 @@ import torch
 
 from hyuav import InputError, Scenario
 from hyuav.learning import training as training_module
-from hyuav.learning.cohort import Cohort, Learner
+from hyuav.learning.guide.parameters import Guide
 from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.torchrl_internals import next_observation
+from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.physics.offloading import MODE_RULES
 
@@ -31,17 +33,14 @@ CASES = [
 ]
 
 
-GUESS = "expectation.guess"
+GUESS = "guide.reward_model.guess"
 """Decided by rounding where less is remembered than there are features, as here; so it is not
 compared, and no flight is imagined that it would choose."""
 
 
 def cohort(name: str, scenario: Scenario = SCENARIO, batch_size: int = 8) -> Cohort:
-    short: dict[str, Any] = (
-        {"warm_up_episodes": 3, "repeat_every": 2, "imagined_flights": 0}
-        if name.endswith("robust")
-        else {}
-    )
+    guide = Guide(warm_up_episodes=3, update_every=2, repeat_every=2, imagined_flights=0)
+    short: dict[str, Any] = {"guide": guide} if name.endswith("robust") else {}
     return Cohort(
         scenario,
         LEARNERS,
@@ -59,7 +58,7 @@ def tensors(trained: Cohort) -> dict[str, torch.Tensor]:
         for index, state in enumerate(step.optimizer.state_dict()["state"].values()):
             found |= {f"{step.name}.{index}.{key}": values for key, values in state.items()}
     found |= {str(key): values for key, values in trained.replay[:].items(True, True)}
-    carrier = trained.collector._carrier
+    carrier = next_observation(trained.collector)
     for stream, state in trained.state_dict()["random"].items():
         found[f"drawn from {stream}"] = torch.tensor(state["drawn"])
     found |= {f"carrier.{key}": carrier[key] for key in ("observation", "mode", "step_count")}
@@ -107,7 +106,7 @@ def test_the_slot_is_known_in_which_numbers_were_no_longer_finite() -> None:
     for trained in (eager, compiled):
         for _ in range(2):
             trained.fly()
-        trained.replay.storage._storage["next", "reward"][1, 1] = torch.inf
+        trained.stored["next", "reward"][1, 1] = torch.inf
     compiled.compile()
     finite = [trained.fly().finite.tolist() for trained in (eager, compiled)]
     assert finite[0] == finite[1]

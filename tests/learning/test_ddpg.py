@@ -7,6 +7,7 @@ from torch import Tensor, nn
 
 from batches import TEN_UES, mini_batch
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import update_networks, update_targets
 
 SIZES = (15, 12, 8, 8, 2)
 
@@ -29,8 +30,8 @@ def test_an_update_is_the_papers_for_every_learner() -> None:
     algorithm = hyperparameters.build(2, TEN_UES)
     start = copy.deepcopy(algorithm.loss.state_dict())
     batch = mini_batch(2, 70)
-    algorithm.update_networks(batch.clone(), 1)
-    algorithm.update_targets(1)
+    update_networks(algorithm, batch.clone(), 1)
+    update_targets(algorithm, 1)
     after = algorithm.loss.state_dict()
 
     for learner in range(2):
@@ -92,11 +93,7 @@ def test_the_defaults_are_the_papers() -> None:
         "geofence": False,
         "reward_scale": 1.0,
         "layer_norm": False,
-        "warm_up_episodes": 0,
-        "repeat_every": 0,
-        "action_stretch": 1.0,
-        "alternatives_weight": 0.0,
-        "control_variate": False,
-        "imagined_flights": 0,
+        "action_scale": 1.0,
         "afterstate": False,
+        "coverage_blur": 0.02,
     }

@@ -7,8 +7,9 @@ import torch
 from scipy import stats
 
 from hyuav import Scenario
-from hyuav.learning.cohort import Learner
+from hyuav.learning.guide.parameters import Guide
 from hyuav.learning.registry import ALGORITHMS
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.references.optimum import solve_optimum
 
@@ -26,7 +27,7 @@ def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
         hidden_sizes=(64, 64),
         actor_learning_rate=1e-3,
         critic_learning_rate=1e-3,
-        warm_up_episodes=20 * robust,
+        **({"guide": Guide(warm_up_episodes=20)} if robust else {}),
     )
     parameters = TrainingParameters(
         num_episodes=80 * (1 + robust),  # some of which are flown at random

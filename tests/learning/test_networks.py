@@ -10,7 +10,7 @@ from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.networks import (
     LearnerLinear,
     LearnerMLP,
-    StretchedTanh,
+    ScaledTanh,
     make_actor,
     make_critic,
 )
@@ -60,16 +60,16 @@ def test_hidden_layers_have_the_sizes_of_the_paper_by_default() -> None:
     assert shapes == [(15, 300), (300, 100), (100, 100), (100, 2)]
 
 
-def test_a_stretched_tanh_reaches_full_speed_where_it_is_not_flat() -> None:
-    stretched = StretchedTanh(1.04)
+def test_a_scaled_tanh_reaches_full_speed_where_it_is_not_flat() -> None:
+    scaled = ScaledTanh(1.04)
     inputs = torch.tensor([-9.0, -2.0, 0.0, 0.5, 2.0, 9.0])
     expected = torch.tensor([-1.0, -1.0, 0.0, 1.04 * math.tanh(0.5), 1.0, 1.0])
-    torch.testing.assert_close(stretched(inputs), expected)
+    torch.testing.assert_close(scaled(inputs), expected)
 
 
-def test_an_actor_may_stretch_its_tanh() -> None:
+def test_an_actor_may_scale_its_tanh() -> None:
     torch.manual_seed(0)
-    actor = make_actor(2, 15, (8,), "tanh", stretch=1.1)
+    actor = make_actor(2, 15, (8,), "tanh", scale=1.1)
     data = TensorDict(observation=torch.randn(2, 6, 15), batch_size=[2, 6])
     action = (1.1 * actor.module.layers(data["observation"]).tanh()).clamp(-1.0, 1.0)
     torch.testing.assert_close(actor(data)["action"], action)
@@ -84,7 +84,7 @@ def test_normalized_layers_do_not_depend_on_the_scale_of_their_inputs() -> None:
 
 def test_a_critic_counts_of_each_ue_what_is_covered() -> None:
     scenario = Scenario.preset("two_clusters")
-    afterstate = Afterstate(scenario, clock=False, geofence=False)
+    afterstate = Afterstate(scenario, 0.02, clock=False, geofence=False)
     critic = make_critic(1, 15, (8,), "tanh", afterstate=afterstate).module
     for weight in critic.network.parameters():
         weight.data.zero_()

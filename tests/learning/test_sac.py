@@ -6,6 +6,7 @@ from torchrl.objectives import SACLoss, ValueEstimators
 from batches import TEN_UES, mini_batch
 from hyuav.learning.networks import make_critic
 from hyuav.learning.sac import SAC
+from hyuav.learning.train import update_networks
 
 
 def test_every_learner_has_a_temperature_of_its_own() -> None:
@@ -13,7 +14,7 @@ def test_every_learner_has_a_temperature_of_its_own() -> None:
     algorithm = SAC(hidden_sizes=(8,), temperature_learning_rate=0.05).build(3, TEN_UES)
     batch = mini_batch(3, 40)
     for index in range(1, 10):
-        algorithm.update_networks(batch, index)
+        update_networks(algorithm, batch, index)
     temperatures = algorithm.loss.log_alpha.exp().flatten()
     assert temperatures.shape == (3,)
     assert len(set(temperatures.tolist())) == 3
@@ -44,18 +45,18 @@ def test_with_one_learner_the_losses_are_torchrls() -> None:
     torch.testing.assert_close(mine, expected)
 
 
-def test_a_stretch_brings_the_noise_free_action_to_full_speed() -> None:
+def test_a_scale_brings_the_noise_free_action_to_full_speed() -> None:
     torch.manual_seed(0)
-    plain, stretched = (
-        SAC(hidden_sizes=(8,), action_stretch=stretch).build(2, TEN_UES) for stretch in (1.0, 1.5)
+    plain, scaled = (
+        SAC(hidden_sizes=(8,), action_scale=scale).build(2, TEN_UES) for scale in (1.0, 1.5)
     )
-    stretched.loss.load_state_dict(plain.loss.state_dict())
+    scaled.loss.load_state_dict(plain.loss.state_dict())
     data = TensorDict(observation=3.0 * torch.randn(2, 40, 15), batch_size=[2, 40])
     action = plain.actor(data.clone())["action"]
     expected = (1.5 * action).clamp(-1.0, 1.0)
     assert expected.abs().max() == 1.0
-    torch.testing.assert_close(stretched.actor(data.clone())["action"], expected)
-    torch.testing.assert_close(stretched.loss.mean_action(data), expected)
+    torch.testing.assert_close(scaled.actor(data.clone())["action"], expected)
+    torch.testing.assert_close(scaled.act(data), expected)
 
 
 def test_the_noise_free_action_is_the_mode_of_the_explored_ones() -> None:

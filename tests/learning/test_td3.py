@@ -2,6 +2,7 @@ import torch
 
 from batches import TEN_UES, mini_batch
 from hyuav.learning.td3 import TD3
+from hyuav.learning.train import update_networks, update_targets
 from hyuav.learning.weights import copy_weights
 
 
@@ -10,8 +11,8 @@ def test_actor_and_targets_follow_in_every_second_update() -> None:
     kept = ("actor_network_params", "target_actor_network_params", "target_qvalue_network_params")
     for index, moves in ((1, False), (2, True), (3, False), (4, True)):
         before = copy_weights(algorithm.loss)
-        losses = algorithm.update_networks(mini_batch(1, 20), index)
-        algorithm.update_targets(index)
+        losses = update_networks(algorithm, mini_batch(1, 20), index)
+        update_targets(algorithm, index)
         after = copy_weights(algorithm.loss)
         changed = {
             prefix: any(

@@ -13,7 +13,7 @@ import pytest
 from faults import leave_overflowing
 from hyuav._support import machine
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.learning.robust import RobustDDPG
+from hyuav.learning.guide.robust import RobustDDPG
 from recipe_calls import TINY_COMPARISON, Call, Refusal
 
 Printed = pytest.CaptureFixture[str]
@@ -250,7 +250,7 @@ def test_an_older_comparison_is_taken_up_and_its_shards_may_not_be_cut_anew(
     config = tmp_path / "here" / "config.yaml"
     lines = config.read_text().splitlines(keepends=True)
     added = ("shard_learners:", "engine:", "address:", "retries:")
-    unknown = (*added, "    imagined_flights:")
+    unknown = (*added, "    coverage_blur:")
     config.write_text("".join(line for line in lines if not line.startswith(unknown)))
     shards = {path.name for path in (tmp_path / "here" / "shards").iterdir()}
     call("compare", *one, "retries=0")

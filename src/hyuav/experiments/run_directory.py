@@ -22,8 +22,8 @@ from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import read_metrics
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
-from hyuav.learning.cohort import Learner
 from hyuav.learning.registry import find
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.physics.scenario import PRESETS, Scenario
 

@@ -8,9 +8,6 @@ from hyuav.envs.transforms import fenced
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
 
-BLUR = 0.02
-"""Of the coverage's edge, in units of the map's side; so that a gradient is felt beside it."""
-
 
 class Afterstate(nn.Module):
     """The state between an action and its slot's fading (Sutton and Barto, 2018, section 6.8).
@@ -25,18 +22,22 @@ class Afterstate(nn.Module):
 
     Args:
         scenario: its nodes, speed limit and map.
+        coverage_blur: how wide the edge of the coverage is shown, as a share of the map's side.
         clock: whether the slots flown are observed.
         geofence: whether flights are slowed to end on the map.
     """
 
-    def __init__(self, scenario: Scenario, *, clock: bool, geofence: bool) -> None:
+    def __init__(
+        self, scenario: Scenario, coverage_blur: float, *, clock: bool, geofence: bool
+    ) -> None:
         super().__init__()
+        self._blur = coverage_blur * scenario.map_side
         self._physics = Physics(scenario, torch.get_default_device())
         self._norm_limit = self._physics.norm_limit(["hybrid"])
-        self._layout = ObservationLayout(scenario, clock=clock)
+        self.layout = ObservationLayout(scenario, clock=clock)
         self._clock, self._geofence = clock, geofence
         self.num_ues = scenario.num_ues
-        self.size = self._layout.size + self.num_ues
+        self.size = self.layout.size + self.num_ues
 
     def forward(self, observation: Tensor, action: Tensor) -> Tensor:
         """Map observations and actions (..., 2) to features (..., size).
@@ -46,12 +47,12 @@ class Afterstate(nn.Module):
         one.
         """
         scenario = self._physics.scenario
-        position = self._layout.position(observation) * (scenario.map_side / 2)
+        position = self.layout.position(observation) * (scenario.map_side / 2)
         if self._geofence:
             action = fenced(scenario, position, action)
         moved = self._physics.move(position, self._physics.velocity(action, self._norm_limit))
         beside = moved.off_map.unsqueeze(-1) * 2.0 - 1.0
-        return self._features(moved.position, beside, self._layout.clock(observation))
+        return self._features(moved.position, beside, self.layout.clock(observation))
 
     def at(self, place: Tensor, clock: Tensor) -> Tensor:
         """The features (..., size) of having flown somewhere on the map.
@@ -65,7 +66,7 @@ class Afterstate(nn.Module):
 
     def coverage(self, features: Tensor) -> Tensor:
         """How far the helper covers each UE there, from 0 to 1: (..., U), of features (..., F)."""
-        first = 2 + self._layout.num_distances
+        first = 2 + self.layout.num_distances
         shown = features[..., first : first + self.num_ues]
         return 0.5 * (shown + 1.0)
 
@@ -78,7 +79,7 @@ class Afterstate(nn.Module):
         features = [
             position / half_side,
             distances / half_side - 1.0,
-            torch.tanh(inside / (BLUR * scenario.map_side)),
+            torch.tanh(inside / self._blur),
             beside,
         ]
         return torch.cat([*features, clock] if self._clock else features, dim=-1)

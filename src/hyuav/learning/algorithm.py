@@ -2,42 +2,26 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import torch
 from pydantic import Field
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from tensordict import TensorDictBase
-from tensordict.nn import (
-    TensorDictModule,
-    TensorDictModuleBase,
-    TensorDictParams,
-    TensorDictSequential,
-)
+from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictParams
 from torch import Tensor, nn
+from torchrl.envs import TransformedEnv
 from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 
-from hyuav._support.parameters import (
-    Count,
-    CountOrZero,
-    Fraction,
-    OneOf,
-    Parameters,
-    PositiveNumber,
-    parameter,
-)
+from hyuav._support.parameters import Count, Fraction, OneOf, Parameters, PositiveNumber, parameter
+from hyuav._support.randomness import RowStream
 from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.afterstate import Afterstate
-from hyuav.learning.exploration import WarmUp
-from hyuav.learning.guide.control_variate import ControlVariate
-from hyuav.learning.guide.demonstrations import BestFlights
-from hyuav.learning.guide.imitation import Alternatives
-from hyuav.learning.guide.reward_model import Expectation
-from hyuav.learning.networks import ACTIVATIONS, make_critic
-from hyuav.learning.replay import Memory
-from hyuav.learning.targets import raise_target
+from hyuav.learning.memory import Need, needed_for_networks
+from hyuav.learning.networks import ACTIVATIONS, make_actor, make_critic
+from hyuav.learning.replay import FADING, TransitionOptions
 from hyuav.physics.scenario import Scenario
 
 Sizes = Annotated[
@@ -45,12 +29,14 @@ Sizes = Annotated[
     Field(min_length=1, description="the sizes of at least one hidden layer"),
 ]
 
-VARIATE_LEARNING_RATE = 1e-3
-
 
 @pydantic_dataclass(frozen=True)
 class AlgorithmParameters(Parameters, ABC):
-    """What all algorithms have in common; the defaults are the paper's."""
+    """What all algorithms have in common; the defaults are the paper's.
+
+    ``clock``, ``geofence`` and ``reward_scale`` change the environment; ``layer_norm``,
+    ``afterstate``, ``coverage_blur`` and ``action_scale`` the networks.
+    """
 
     hidden_sizes: Sizes = parameter((300, 100, 100))
     activation: Annotated[str, OneOf(*ACTIVATIONS)] = parameter("tanh")
@@ -64,29 +50,17 @@ class AlgorithmParameters(Parameters, ABC):
     geofence: bool = parameter(False)
     """Slow flights so that they end on the map."""
     reward_scale: PositiveNumber = parameter(1.0)
+    """Factor of the rewards that are stored."""
     layer_norm: bool = parameter(False)
     """In the critics."""
     afterstate: bool = parameter(False)
     """Let the critics see where an action leads; see
     :class:`hyuav.learning.afterstate.Afterstate`."""
-    warm_up_episodes: CountOrZero = parameter(0)
-    """Flown to places all over the map; see :class:`hyuav.learning.exploration.WarmUp`."""
-    repeat_every: CountOrZero = parameter(0)
-    """After the warm-up, every n-th episode takes the actions of the best flight so far, or of one
-    that may be better; 0 for never. See :class:`hyuav.learning.guide.planner.FlightSearch`."""
-    control_variate: bool = parameter(False)
-    """Take off each reward what its slot's fading brought; see
-    :class:`hyuav.learning.guide.control_variate.ControlVariate`."""
-    imagined_flights: Annotated[int, Field(ge=0, le=100_000)] = parameter(0)
-    """After each episode from the end of the warm-up on, where flights are kept and there is a
-    control variate: how many straight flights are judged, and as many variations of the best; see
-    :class:`hyuav.learning.guide.proposals.Imagination`."""
-    action_stretch: Annotated[float, Field(ge=1.0, le=2.0)] = parameter(1.0)
-    """Of the tanh that ends the actor; see :class:`hyuav.learning.networks.StretchedTanh`."""
-    alternatives_weight: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(0.0)
-    """How strongly the actor is drawn to an alternative that is worth more than what it does; with
-    any weight, the critics' target counts whichever is worth more. See
-    :class:`hyuav.learning.guide.imitation.Alternatives`."""
+    coverage_blur: PositiveNumber = parameter(0.02)
+    """How wide an afterstate shows the edge of a UE's coverage, as a share of the map's side; so
+    that a gradient is felt beside it."""
+    action_scale: Annotated[float, Field(ge=1.0, le=2.0)] = parameter(1.0)
+    """Of the tanh that ends the actor; see :class:`hyuav.learning.networks.ScaledTanh`."""
 
     @abstractmethod
     def build(self, learners: int, scenario: Scenario) -> "Algorithm":
@@ -97,93 +71,74 @@ class AlgorithmParameters(Parameters, ABC):
             scenario: that they fly.
         """
 
-    def assemble(self, learners: int, scenario: Scenario) -> "Algorithm":
-        """What :meth:`build` makes, and around it what works with any algorithm.
+    def guided(
+        self,
+        algorithm: "Algorithm",
+        env: TransformedEnv,  # noqa: ARG002
+        seeds: Sequence[int],  # noqa: ARG002
+    ) -> "Algorithm":
+        """An algorithm with what guides its learners; here as it is.
 
         Args:
-            learners: N.
-            scenario: that they fly.
+            algorithm: that :meth:`build` has made, with the learners' initial weights.
+            env: that the N learners fly.
+            seeds: of their random numbers.
         """
-        algorithm = self.build(learners, scenario)
-        if self.warm_up_episodes:
-            warm_up = WarmUp(learners, self.warm_up_episodes, scenario)
-            explorer = TensorDictSequential(algorithm.explorer, warm_up)
-            algorithm = replace(algorithm, explorer=explorer)
-        if self.keeps_flights and algorithm.best_flights is None:
-            flights = BestFlights(learners, scenario)
-            algorithm = replace(algorithm, best_flights=flights)
-        if self.control_variate:
-            variate = ControlVariate(learners, scenario, self.reward_scale, clock=self.clock)
-            optimizer = adam(variate, VARIATE_LEARNING_RATE)
-            step = GradientStep("control variate", variate.loss, optimizer)
-            expectation = Expectation(learners, variate, self.reward_scale)
-            steps = (step, *algorithm.steps)
-            algorithm = replace(algorithm, steps=steps, expectation=expectation)
         return algorithm
+
+    def least_replay(self, num_slots: int) -> int:  # noqa: ARG002
+        """How many slots a replay buffer must hold at least, with episodes of so many."""
+        return 1
+
+    def needed_memory(
+        self, scenario: Scenario, horizons: Sequence[int], sizes: Mapping[str, int]
+    ) -> list[Need]:
+        """What a training keeps in memory; see :func:`hyuav.learning.memory.require_memory`."""
+        layout = ObservationLayout(scenario, clock=True)
+        inputs = 2 * layout.size if self.afterstate else layout.size + layout.action_size
+        layers = (inputs, *self.hidden_sizes, layout.action_size)
+        return needed_for_networks(layout.size, horizons, layers, sizes)
+
+    @property
+    def transitions(self) -> TransitionOptions:
+        """What is kept of each slot."""
+        return TransitionOptions(self.reward_scale, finite_horizon=self.clock)
+
+    @property
+    def environment(self) -> dict[str, bool]:
+        """The options of :func:`hyuav.make_env` with which learners fly."""
+        tells_fading = FADING in self.transitions.names
+        return {"clock": self.clock, "geofence": self.geofence, "fading": tells_fading}
 
     def observation_size(self, scenario: Scenario) -> int:
         """Numbers of an observation."""
         return ObservationLayout(scenario, clock=self.clock).size
 
+    def make_actor(self, learners: int, scenario: Scenario) -> TensorDictModule:
+        """mu(s) of N learners, as :func:`hyuav.learning.networks.make_actor` describes it."""
+        size = self.observation_size(scenario)
+        return make_actor(
+            learners, size, self.hidden_sizes, self.activation, scale=self.action_scale
+        )
+
     def make_critic(self, learners: int, scenario: Scenario) -> TensorDictModule:
         """Q(s, a) of N learners, as :func:`hyuav.learning.networks.make_critic` describes it."""
-        afterstate = None
-        if self.afterstate:
-            afterstate = Afterstate(scenario, clock=self.clock, geofence=self.geofence)
         return make_critic(
             learners,
             self.observation_size(scenario),
             self.hidden_sizes,
             self.activation,
             layer_norm=self.layer_norm,
-            afterstate=afterstate,
+            afterstate=self.make_afterstate(scenario, self.geofence) if self.afterstate else None,
         )
 
-    @property
-    def keeps_flights(self) -> bool:
-        """Whether best flights are of use."""
-        return self.repeat_every > 0 or self.alternatives_weight > 0
-
-    @property
-    def memory(self) -> Memory:
-        """What is kept of each slot."""
-        return Memory(self.reward_scale, finite_horizon=self.clock, fading=self.control_variate)
+    def make_afterstate(self, scenario: Scenario, geofence: bool) -> Afterstate:
+        """Where actions lead; see :class:`hyuav.learning.afterstate.Afterstate`."""
+        return Afterstate(scenario, self.coverage_blur, clock=self.clock, geofence=geofence)
 
     def estimate_values(self, loss: LossModule) -> None:
         """Give a loss the target of eq. 9, with the discount."""
         loss.make_value_estimator(ValueEstimators.TD0, gamma=self.discount)
-
-    def weigh(
-        self,
-        loss: LossModule,
-        critic: str,
-        act: Callable[[TensorDictBase], Tensor],
-        flights: BestFlights,
-    ) -> Callable[[TensorDictBase], Tensor | float]:
-        """Give a loss its target, and say what is to be added to the actor's loss.
-
-        Args:
-            loss: of N learners.
-            critic: what the loss calls its critics.
-            act: maps a mini-batch (N, K) to the actors' noise-free actions.
-            flights: the best so far.
-
-        Returns:
-            :meth:`hyuav.learning.guide.imitation.Alternatives.missed`, or 0 where alternatives are
-            not weighed.
-        """
-        self.estimate_values(loss)
-        if not self.alternatives_weight:
-            return lambda _: 0.0
-        weight = self.alternatives_weight
-        alternatives = Alternatives(loss, critic, act, flights, weight, clock=self.clock)
-        raise_target(loss, self.discount, alternatives.worth)
-        return alternatives.missed
-
-    @property
-    def explorer_normals(self) -> int:
-        """Standard normal tensors (N, 2) that the explorer draws for each slot."""
-        return 1 + (self.warm_up_episodes > 0)
 
 
 @dataclass(frozen=True)
@@ -194,17 +149,65 @@ class GradientStep:
     loss: Callable[[TensorDictBase], Tensor]
     """Maps a mini-batch (N, K) to losses (N, K): learners in rows, transitions in columns."""
     optimizer: torch.optim.Optimizer
+    """Of :func:`adam`."""
     every: int = 1
     """Taken in every n-th update."""
     normals: int = 0
     """Standard normal tensors (N, K, 2) that the loss draws."""
 
 
+class Guidance(nn.Module):
+    """What may guide learners while they train; this one leaves them alone.
+
+    The loop and its compiled form call what stands here and know nothing else of it. Gradient
+    steps, losses and modules of its own a guide adds to the algorithm, in
+    :meth:`AlgorithmParameters.guided`. Its weights and buffers are part of a checkpoint.
+    """
+
+    streams: Mapping[str, RowStream] = {}
+    """Of the random numbers that it draws, by name."""
+    plans: bool = False
+    """Whether it ever has a plan."""
+
+    def plan(self, episode: int) -> Tensor | None:  # noqa: ARG002
+        """Actions (T, N, 2) to execute in an episode, from 1, whatever the explorer says.
+
+        NaN where it is the explorer that acts; None where there never is a plan.
+        """
+        return None
+
+    def prepare(self, batch: TensorDictBase) -> TensorDictBase:
+        """A mini-batch (N, K) as the losses are to see it."""
+        return batch
+
+    def end_episode(self, episode: int, flown: TensorDictBase, stored: TensorDictBase) -> None:
+        """Take note of an episode.
+
+        Args:
+            episode: which one it was, from 1.
+            flown: (T, N), its transitions.
+            stored: (n, N), all that are in the replay buffer.
+        """
+
+    def control_term(self, slot: TensorDictBase) -> Tensor:
+        """What of a slot's reward, scaled as those that are stored, is known to be chance.
+
+        Args:
+            slot: (N, ...), with what follows it.
+
+        Returns:
+            (N, ..., 1).
+        """
+        return torch.zeros_like(slot["next", "reward"])
+
+    def end_evaluation(self, positions: Tensor) -> None:
+        """Take note of where the actors fly: (T, N, 2), in units of half the map's side."""
+
+
 @dataclass(frozen=True)
 class Algorithm:
     """The parts of an algorithm for N learners, ready to train."""
 
-    parameters: AlgorithmParameters
     actor: TensorDictModuleBase
     """mu: writes the noise-free ``action`` (N, ..., 2) from ``observation`` (N, ..., U + 5)."""
     explorer: TensorDictModuleBase
@@ -217,16 +220,19 @@ class Algorithm:
     """theta' <- tau theta + (1 - tau) theta'."""
     target_every: int = 1
     """The targets follow in every n-th update."""
-    best_flights: BestFlights | None = None
-    """Of each learner, where they are of use."""
-    expectation: Expectation | None = None
-    """What flights are expected to earn, if it is learned, and with it the control variate, which
-    takes the luck of the fading off the rewards of a mini-batch."""
+    explorer_normals: int = 1
+    """Standard normal tensors (N, 2) that the explorer draws for each slot."""
+    mean_action: Callable[[TensorDictBase], Tensor] | None = None
+    """The actor's noise-free actions (N, K, 2) of a mini-batch, with gradients, where the actor
+    explores by a distribution of its own; None where they are what :attr:`actor` writes."""
+    guide: Guidance = field(default_factory=Guidance)
 
-    def repeats(self, episode: int) -> bool:
-        """Whether an episode, from 1, takes the actions of the flight that is to be tried."""
-        every = self.parameters.repeat_every
-        return every > 0 and episode % every == 0 and episode > self.parameters.warm_up_episodes
+    def act(self, batch: TensorDictBase) -> Tensor:
+        """The actor's noise-free actions (N, K, 2) of a mini-batch, with gradients."""
+        if self.mean_action is not None:
+            return self.mean_action(batch)
+        action: Tensor = self.actor(batch.select("observation"))["action"]
+        return action
 
     def due(self, index: int) -> tuple[bool, ...]:
         """Which gradient steps the update of this index takes, and last whether targets follow."""
@@ -241,46 +247,15 @@ class Algorithm:
         """Every combination of steps that an update takes."""
         return {self.due(index) for index in range(1, math.lcm(*self._periods) + 1)}
 
-    def fair(self, batch: TensorDictBase) -> TensorDictBase:
-        """A mini-batch (N, K) as the losses want to see it."""
-        return batch if self.expectation is None else self.expectation.variate.fair(batch)
-
-    def update_networks(self, batch: TensorDictBase, index: int) -> dict[str, Tensor]:
-        """Take the gradient steps, eq. 9 and 10 for DDPG, on one mini-batch of each learner.
-
-        Args:
-            batch: (N, K) transitions.
-            index: of this update, from 1, for the parts that are not taken every time.
-
-        Returns:
-            the mean loss (N,) of each step that was taken, by the step's name.
-        """
-        losses = {}
-        batch = self.fair(batch)
-        for step, due in zip(self.steps, self.due(index), strict=False):
-            if not due:
-                continue
-            loss = step.loss(batch).mean(dim=-1)
-            step.optimizer.zero_grad()
-            loss.sum().backward()  # learners share no weight, so the sum keeps them apart
-            step.optimizer.step()
-            losses[step.name] = loss.detach()
-        return losses
-
-    def update_targets(self, index: int) -> None:
-        """Let the target networks follow, in every ``target_every``-th update."""
-        if self.due(index)[-1]:
-            self.target.step()
+    @property
+    def loss_normals(self) -> int:
+        """Standard normal tensors (N, K, 2) that the losses draw in an update."""
+        return sum(step.normals for step in self.steps)
 
     @property
     def modules(self) -> nn.ModuleDict:
         """All weights and buffers that training changes."""
-        modules = {"loss": self.loss, "explorer": self.explorer}
-        if self.best_flights is not None:
-            modules["best_flights"] = self.best_flights
-        if self.expectation is not None:
-            modules["expectation"] = self.expectation
-        return nn.ModuleDict(modules)
+        return nn.ModuleDict({"loss": self.loss, "explorer": self.explorer, "guide": self.guide})
 
 
 def adam(weights: TensorDictParams | nn.Module, learning_rate: float) -> torch.optim.Adam:

@@ -4,7 +4,8 @@ What the graph does is recorded from the parts that the eager path is made of: e
 environment with its transforms, TorchRL's losses. Written out here is only what lies between
 them: storing to and sampling from the replay buffer's own tensors, Adam on the optimizers' own
 states, and the targets' soft update. Both paths share every tensor and every random number, so a
-training may change over between any two episodes and a checkpoint serves both.
+training may change over between any two episodes and a checkpoint serves both. The paths are
+held equal by tests.
 """
 
 import functools
@@ -17,16 +18,17 @@ from torch import Tensor
 from torchrl.data import ReplayBuffer
 from torchrl.envs import TransformedEnv
 
-from hyuav._support.randomness import given_normals
+from hyuav._support.randomness import RowStream, given_normals
 from hyuav._support.recording import compile_function
 from hyuav.envs.draws import GivenDraws
 from hyuav.learning.algorithm import Algorithm, GradientStep
-from hyuav.learning.guide.demonstrations import as_planned
-from hyuav.learning.replay import sampled_slots
+from hyuav.learning.exploration import as_planned
+from hyuav.learning.replay import TransitionOptions, sampled_slots
+from hyuav.learning.torchrl_internals import cursor_of, set_filled
 from hyuav.physics.tasks import Tasks
 
 
-class Flown(NamedTuple):
+class FlownEpisode(NamedTuple):
     """What an episode brought to each of N learners."""
 
     reward: Tensor
@@ -48,8 +50,9 @@ class CompiledSlots:
     Args:
         env: of batch size (N,).
         algorithm: whose weights and optimizers' states are changed.
-        replay: which holds at least one transition.
-        batch_size: K.
+        transitions: what is kept of each slot.
+        replay: whose slots are changed.
+        stored: those, (capacity, N).
         carrier: what the helpers observe, (N,); an example.
 
     Raises:
@@ -60,13 +63,14 @@ class CompiledSlots:
         self,
         env: TransformedEnv,
         algorithm: Algorithm,
+        transitions: TransitionOptions,
         replay: ReplayBuffer,
-        batch_size: int,
+        stored: TensorDictBase,
         carrier: TensorDictBase,
     ) -> None:
-        self._env, self._algorithm, self._replay = env, algorithm, replay
-        observed = (*env.observation_spec.keys(), *env.done_keys)
-        self._carrier = carrier.select(*observed).clone()
+        self._env, self._algorithm = env, algorithm
+        self._transitions, self._replay, self._stored = transitions, replay, stored
+        self._carrier = carrier.clone()
         self._adam = {step.name: AdamState(step) for step in algorithm.steps}
         weights = dict(algorithm.loss.named_parameters())
         self._targets = [
@@ -75,7 +79,6 @@ class CompiledSlots:
             if name.startswith("target_")
         ]
         learners, device = env.batch_size[0], env.device
-        self._storage = replay.storage._storage
         self._learners = torch.arange(learners, device=device).unsqueeze(-1)
         self._cursor = torch.zeros(1, dtype=torch.int64, device=device)
         self._length = torch.zeros(1, dtype=torch.int64, device=device)
@@ -83,30 +86,38 @@ class CompiledSlots:
             name: torch.zeros(learners, device=device) for name in ("reward", *self._adam)
         }
         self._finite = torch.zeros(learners, dtype=torch.int64, device=device)
-        examples = self._examples(batch_size)
+        examples = self._examples(replay.batch_size)
         self._names = tuple(examples)
         self._programs = {
             taken: compile_function(functools.partial(self._slot, taken), [*examples.values()])
             for taken in algorithm.all_due
         }
 
-    def fly(self, carrier: TensorDictBase, draws: Mapping[str, Tensor], updates: int) -> Flown:
-        """Fly and learn for as many slots as there are draws.
+    def fly(
+        self,
+        carrier: TensorDictBase,
+        streams: Mapping[str, RowStream],
+        plan: Tensor | None,
+        slots: int,
+        updates: int,
+    ) -> FlownEpisode:
+        """Fly and learn for some slots.
 
         Args:
             carrier: what the helpers observe before the first slot, (N,); left as it is.
-            draws: random numbers, a slot in each row: ``exploration`` (slots, N, n, 2), standard
-                normal, where the explorer draws n times; ``sampling`` (slots, N, K), uniform;
-                ``losses`` (slots, N, n, K, 2), standard normal, where the losses draw n times;
-                ``plan`` (slots, N, 2), actions to take whatever the explorer says, NaN for none,
-                where the algorithm repeats flights; ``fading`` (slots, N, links) and ``tasks``
-                (slots, N, 2, U) where the environment needs them.
+            streams: of random numbers: ``exploration`` (N, n, 2), standard normal, where the
+                explorer draws n times; ``sampling`` (N, K), uniform; ``losses`` (N, n, K, 2),
+                standard normal, where the losses draw n times. The environment has its own.
+            plan: see :meth:`hyuav.learning.algorithm.Guidance.plan`.
+            slots: how many.
             updates: taken before.
         """
-        slots = len(draws["exploration"])
         self._begin(carrier)
         counts = dict.fromkeys(self._adam, 0)
+        draws = self._draws(streams, slots)
         blocks = {**draws, "corrections": self._corrections(updates, slots)}
+        if plan is not None:
+            blocks["plan"] = plan
         with torch.no_grad():
             rows = zip(*(blocks[name] for name in self._names), strict=True)
             for slot, inputs in enumerate(rows):
@@ -116,11 +127,21 @@ class CompiledSlots:
                     counts[name] += due
         self._end(updates + slots, slots)
         losses = {name: self._totals[name] / count for name, count in counts.items() if count}
-        return Flown(self._totals["reward"].clone(), losses, self._finite.clone())
+        return FlownEpisode(self._totals["reward"].clone(), losses, self._finite.clone())
+
+    def _draws(self, streams: Mapping[str, RowStream], slots: int) -> dict[str, Tensor]:
+        """The random numbers of all slots, a slot in each row."""
+        env = self._env.base_env
+        blocks = {name: stream.take(slots) for name, stream in streams.items()}
+        if env.scenario.fading:
+            blocks["fading"] = env.draws.take_fading(slots).contiguous()  # where rows are shared
+        if env.physics.edge_can_saturate:
+            blocks["tasks"] = env.draws.take_tasks(slots).contiguous()
+        return blocks
 
     def _begin(self, carrier: TensorDictBase) -> None:
-        self._carrier.update_(carrier.select(*self._carrier.keys()))
-        self._cursor.fill_(self._replay.writer._cursor)
+        self._carrier.update_(carrier)
+        self._cursor.fill_(cursor_of(self._replay))
         self._length.fill_(len(self._replay))
         for total in (*self._totals.values(), self._finite):
             total.zero_()
@@ -128,9 +149,8 @@ class CompiledSlots:
     def _end(self, updates: int, slots: int) -> None:
         """Let the eager parts know what they did not count."""
         capacity = self._replay.storage.max_size
-        cursor = (self._replay.writer._cursor + slots) % capacity
-        self._replay.storage._len = min(len(self._replay) + slots, capacity)
-        self._replay.writer.load_state_dict({"_cursor": cursor})
+        length = min(len(self._replay) + slots, capacity)
+        set_filled(self._replay, length, (cursor_of(self._replay) + slots) % capacity)
         for step in self._algorithm.steps:
             self._adam[step.name].set_count(updates // step.every)
 
@@ -147,14 +167,13 @@ class CompiledSlots:
     def _examples(self, batch_size: int) -> dict[str, Tensor]:
         """Tensors of the shapes in which a slot's random numbers come."""
         learners, device = self._env.batch_size[0], self._env.device
-        physics, steps = self._env.base_env.physics, self._algorithm.steps
-        normals = sum(step.normals for step in steps)
+        physics, normals = self._env.base_env.physics, self._algorithm.loss_normals
         shapes: dict[str, tuple[int, ...]] = {
-            "exploration": (learners, self._algorithm.parameters.explorer_normals, 2),
+            "exploration": (learners, self._algorithm.explorer_normals, 2),
             "sampling": (learners, batch_size),
-            "corrections": (len(steps), 2),
+            "corrections": (len(self._adam), 2),
         }
-        if self._algorithm.parameters.repeat_every:
+        if self._algorithm.guide.plans:
             shapes["plan"] = (learners, 2)
         if normals:
             shapes["losses"] = (learners, normals, batch_size, 2)
@@ -169,11 +188,11 @@ class CompiledSlots:
         """What is recorded: one slot of all learners, with its update."""
         given = dict(zip(self._names, inputs, strict=True))
         flown = self._fly_slot(given)
-        self._store(self._algorithm.parameters.memory.transition(flown))
-        self._go_on(flown)
+        self._store(self._transitions.transition(flown))
+        self._observe(flown)
         normals = given["losses"].unbind(dim=1) if "losses" in given else ()
         with given_normals(iter(normals)):
-            batch = self._algorithm.fair(self._sample(given["sampling"]))
+            batch = self._algorithm.guide.prepare(self._sample(given["sampling"]))
             self._update(batch, taken, given["corrections"])
         self._totals["reward"].add_(flown["next", "reward"].squeeze(-1))
         self._finite.add_(all_finite(self._totals.values()))
@@ -189,15 +208,15 @@ class CompiledSlots:
         finally:
             env.base_env.draws = draws
 
-    def _go_on(self, flown: TensorDictBase) -> None:
+    def _observe(self, flown: TensorDictBase) -> None:
         """What was the next observation is now the present one."""
         following = self._env.step_mdp(flown)
         for name, values in self._carrier.items():
             values.copy_(following[name])
 
     def _store(self, transition: TensorDictBase) -> None:
-        for name in self._algorithm.parameters.memory.names:
-            self._storage[name].index_copy_(0, self._cursor, transition[name].unsqueeze(0))
+        for name in self._transitions.names:
+            self._stored[name].index_copy_(0, self._cursor, transition[name].unsqueeze(0))
         capacity = self._replay.storage.max_size
         self._cursor.copy_((self._cursor + 1) % capacity)
         self._length.copy_((self._length + 1).clamp(max=capacity))
@@ -205,8 +224,8 @@ class CompiledSlots:
     def _sample(self, uniform: Tensor) -> TensorDictBase:
         slots = sampled_slots(uniform, self._length)
         batch = TensorDict(batch_size=uniform.shape, device=self._env.device)
-        for name in self._algorithm.parameters.memory.names:
-            batch[name] = self._storage[name][slots, self._learners]
+        for name in self._transitions.names:
+            batch[name] = self._stored[name][slots, self._learners]
         return batch
 
     def _update(self, batch: TensorDictBase, taken: tuple[bool, ...], corrections: Tensor) -> None:
@@ -228,7 +247,7 @@ class AdamState:
     """Adam (Kingma and Ba, ICLR 2015) on the state of a :class:`torch.optim.Adam`.
 
     Args:
-        step: whose optimizer's state is made, where there is none yet, and used.
+        step: whose optimizer's state is used.
     """
 
     def __init__(self, step: GradientStep) -> None:
@@ -238,10 +257,6 @@ class AdamState:
             self.betas, self._eps = group["betas"], group["eps"]
             for weight in group["params"]:
                 state = step.optimizer.state[weight]
-                if not state:
-                    state["step"] = torch.zeros((), device=weight.device)
-                    state["exp_avg"] = torch.zeros_like(weight)
-                    state["exp_avg_sq"] = torch.zeros_like(weight)
                 moments = state["exp_avg"], state["exp_avg_sq"]
                 self.weights.append(weight)
                 self._rows.append((weight.data, *moments, state["step"], group["lr"]))

@@ -95,25 +95,20 @@ def _over_rows(layers: nn.Module, *inputs: Tensor) -> Tensor:
     return outputs.reshape(*joined.shape[:-1], outputs.shape[-1])
 
 
-def stretched(action: Tensor, stretch: float) -> Tensor:
-    """An action (...) times ``stretch``, cut off at -1 and 1."""
-    return (stretch * action).clamp(-1.0, 1.0)
-
-
-class StretchedTanh(nn.Module):
-    """A tanh times ``stretch``, cut off at -1 and 1, which it so reaches where it is not yet flat.
+class ScaledTanh(nn.Module):
+    """A tanh times ``scale``, cut off at -1 and 1, which it so reaches where it is not yet flat.
 
     Args:
-        stretch: at least 1; a plain tanh for 1.
+        scale: at least 1; a plain tanh for 1.
     """
 
-    def __init__(self, stretch: float) -> None:
+    def __init__(self, scale: float) -> None:
         super().__init__()
-        self.stretch = stretch
+        self.scale = scale
 
     def forward(self, inputs: Tensor) -> Tensor:
         """Map (...) to [-1, 1] (...)."""
-        return stretched(inputs.tanh(), self.stretch)
+        return (self.scale * inputs.tanh()).clamp(-1.0, 1.0)
 
 
 class AfterstateCritic(nn.Module):
@@ -173,14 +168,14 @@ def make_actor(
     hidden_sizes: Sequence[int],
     activation: str,
     *,
-    stretch: float = 1.0,
+    scale: float = 1.0,
 ) -> TensorDictModule:
     """mu(s) of N learners.
 
     Reads ``observation`` (N, ..., U + 5), writes ``action`` (N, ..., 2) in [-1, 1] by a tanh,
-    which may be stretched.
+    which may be scaled.
     """
-    output = StretchedTanh(stretch) if stretch > 1.0 else nn.Tanh()
+    output = ScaledTanh(scale) if scale > 1.0 else nn.Tanh()
     return TensorDictModule(
         LearnerMLP(learners, observation_size, hidden_sizes, 2, activation, output),
         in_keys=["observation"],

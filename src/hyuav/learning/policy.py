@@ -1,15 +1,59 @@
-"""A trained actor as a way to fly: Proposed, Re-OT and Ja-OT."""
+"""Actors that fly without noise: while they are trained, and as Proposed, Re-OT and Ja-OT."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
+from torchrl.envs import TransformedEnv
 
-from hyuav.learning.algorithm import AlgorithmParameters
+from hyuav.envs.observation import ObservationLayout
+from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
 from hyuav.learning.weights import join_learners, load_weights, select_learner
 from hyuav.physics.scenario import Scenario
+
+
+class NoiseFreeReturn(NamedTuple):
+    """What actors earn without noise, on average over the same episodes."""
+
+    reward: Tensor
+    """(N,) bps/Hz, accumulated, with penalties; less what a guide knows to be chance, so that
+    flights are told apart that differ by less."""
+    sum_rate: Tensor
+    """(N,) bps/Hz, the accumulated secrecy sum-rate alone."""
+
+
+@torch.no_grad()
+def fly_noise_free(
+    env: TransformedEnv, algorithm: Algorithm, reward_scale: float
+) -> tuple[NoiseFreeReturn, Tensor]:
+    """Fly actors without noise for an episode of each of an environment's rows.
+
+    Args:
+        env: (N, episodes).
+        algorithm: of N learners.
+        reward_scale: of the rewards that the learners store, against bps/Hz.
+
+    Returns:
+        what they earn, and where they flew in the first of the episodes, (T, N, 2), in units of
+        half the map's side.
+    """
+    scenario, learners = env.base_env.scenario, env.batch_size[0]
+    layout = ObservationLayout(scenario, clock=False)  # places stand first, clock or not
+    off_map, control_term = torch.zeros(2, learners, device=env.device)
+    state, positions = env.reset(), []
+    for _ in range(scenario.num_slots):
+        slot = env.step(algorithm.actor(state))
+        control_term += algorithm.guide.control_term(slot).mean(dim=(1, 2))
+        state = env.step_mdp(slot)
+        off_map += state["off_map"].squeeze(-1).float().mean(dim=-1)
+        positions.append(layout.position(state["observation"])[:, 0])
+    reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
+    sum_rate = reward + scenario.off_map_penalty * off_map
+    earned = NoiseFreeReturn(reward - control_term / reward_scale, sum_rate)
+    return earned, torch.stack(positions)
 
 
 class LearnedPolicy(TensorDictModuleBase):

@@ -13,7 +13,7 @@ from typing import Any
 from hyuav._support.errors import InputError, InputTypeError, one_line, rejection, require_choice
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.robust import RobustDDPG, RobustSAC, RobustTD3
+from hyuav.learning.guide.robust import RobustDDPG, RobustSAC, RobustTD3
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
 

@@ -7,8 +7,11 @@ from typing import Any
 import torch
 from tensordict import NestedKey, TensorDictBase
 from torch import Tensor
-from torchrl.data import LazyTensorStorage, ReplayBuffer
+from torchrl.data import ReplayBuffer, TensorStorage
 from torchrl.data.replay_buffers import RandomSampler, RoundRobinWriter, Storage
+from torchrl.envs import EnvBase
+
+from hyuav.learning.torchrl_internals import cursor_of
 
 TRANSITION: tuple[NestedKey, ...] = (
     "observation",
@@ -48,26 +51,25 @@ class LearnerSampler(RandomSampler):
         return (slots, learners.expand(slots.shape)), {}
 
 
-def make_replay(
-    capacity: int, batch_size: int, uniforms: Iterator[Tensor], device: torch.device
-) -> ReplayBuffer:
-    """The buffer B of Algorithm 1 for N learners.
+def make_replay(slots: TensorDictBase, batch_size: int, uniforms: Iterator[Tensor]) -> ReplayBuffer:
+    """The buffer B of Algorithm 1 for N learners, empty.
 
-    Add one slot of all learners, a tensordict (N,) as :meth:`Memory.transition` makes it;
-    a sample is (N, K).
+    Add one slot of all learners, a tensordict (N,) as :meth:`TransitionOptions.transition` makes
+    it; a sample is (N, K). When the buffer is full, the oldest slots are overwritten.
 
     Args:
-        capacity: transitions kept of each learner; then the oldest are overwritten.
+        slots: (capacity, N), in which transitions are stored.
         batch_size: K.
         uniforms: gives numbers in [0, 1) for each mini-batch, (N, K).
-        device: of the storage.
     """
-    return ReplayBuffer(
-        storage=LazyTensorStorage(capacity, device=device),
+    replay = ReplayBuffer(
+        storage=TensorStorage(slots, device=slots.device),
         sampler=LearnerSampler(uniforms),
         writer=RoundRobinWriter(),
         batch_size=batch_size,
     )
+    replay.empty()
+    return replay
 
 
 def latest(replay: ReplayBuffer, count: int) -> Tensor:
@@ -77,38 +79,24 @@ def latest(replay: ReplayBuffer, count: int) -> Tensor:
     """
     capacity = replay.storage.max_size
     ages = torch.arange(min(count, capacity), 0, -1)
-    return (replay.writer._cursor - ages) % capacity
-
-
-def clear_unused(replay: ReplayBuffer) -> None:
-    """Overwrite by zeros what no transition has been stored in: it is whatever was in memory."""
-    if len(replay):
-        for values in replay.storage._storage.values(include_nested=True, leaves_only=True):
-            values[len(replay) :] = 0
-
-
-def forget(replay: ReplayBuffer, where: Tensor) -> None:
-    """Overwrite what the learners ``where`` (N,) have stored by zeros."""
-    if len(replay):
-        for values in replay.storage._storage.values(include_nested=True, leaves_only=True):
-            values[:, where] = 0
+    return (cursor_of(replay) - ages) % capacity
 
 
 @dataclass(frozen=True)
-class Memory:
-    """What a learner keeps of a slot: a transition, as it wants to see it."""
+class TransitionOptions:
+    """What a learner keeps of a slot."""
 
     reward_scale: float = 1.0
     """Factor of all rewards."""
     finite_horizon: bool = False
     """The last slot of an episode ends the return, which otherwise goes on past it."""
-    fading: bool = False
-    """Keep the slot's fading powers too."""
+    beside: tuple[NestedKey, ...] = ()
+    """Entries of the slot that are kept beside the transition."""
 
     @property
     def names(self) -> tuple[NestedKey, ...]:
-        """The entries of a transition."""
-        return (*TRANSITION, FADING) if self.fading else TRANSITION
+        """All entries that are kept."""
+        return (*TRANSITION, *self.beside)
 
     def transition(self, slot: TensorDictBase) -> TensorDictBase:
         """What is kept of a collected slot (N,)."""
@@ -118,3 +106,8 @@ class Memory:
         if self.finite_horizon:
             kept["next", "terminated"] = kept["next", "done"].clone()
         return kept
+
+    def allocate(self, env: EnvBase, capacity: int) -> TensorDictBase:
+        """Room for the transitions (capacity, N) of what flies in an environment (N,)."""
+        slot = env.fake_tensordict().select(*self.names)
+        return torch.zeros_like(slot.expand(capacity, *slot.batch_size))

@@ -9,8 +9,7 @@ from torchrl.objectives import SoftUpdate, TD3Loss
 
 from hyuav._support.parameters import Count, parameter
 from hyuav.learning.algorithm import Algorithm, GradientStep, adam
-from hyuav.learning.ddpg import DDPG, act
-from hyuav.learning.guide.demonstrations import BestFlights
+from hyuav.learning.ddpg import DDPG
 from hyuav.physics.scenario import Scenario
 
 
@@ -25,10 +24,9 @@ class TD3(DDPG):
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
         actor = self.make_actor(learners, scenario)
-        critic = self.make_critic(learners, scenario)
         loss = TD3Loss(
             actor,
-            critic,
+            self.make_critic(learners, scenario),
             bounds=(-1.0, 1.0),
             num_qvalue_nets=2,
             policy_noise=self.target_noise_std,
@@ -36,27 +34,22 @@ class TD3(DDPG):
             loss_function="l2",
             reduction="none",
         )
-        flights = BestFlights(learners, scenario)
-        missed = self.weigh(loss, "qvalue_network", lambda batch: act(loss, batch), flights)
-        critic_optimizer = adam(loss.qvalue_network_params, self.critic_learning_rate)
-        actor_optimizer = adam(loss.actor_network_params, self.actor_learning_rate)
+        self.estimate_values(loss)
         return Algorithm(
-            parameters=self,
             actor=actor,
-            explorer=TensorDictSequential(actor, self.noise(learners)),
+            explorer=TensorDictSequential(actor, self.make_noise(learners)),
             loss=loss,
-            best_flights=flights if self.keeps_flights else None,
             steps=(
                 GradientStep(
                     "critic",
                     lambda batch: loss.value_loss(batch)[0],
-                    critic_optimizer,
+                    adam(loss.qvalue_network_params, self.critic_learning_rate),
                     normals=1,
                 ),
                 GradientStep(
                     "actor",
-                    lambda batch: loss.actor_loss(batch)[0] + missed(batch),
-                    actor_optimizer,
+                    lambda batch: loss.actor_loss(batch)[0],
+                    adam(loss.actor_network_params, self.actor_learning_rate),
                     every=self.actor_every,
                 ),
             ),

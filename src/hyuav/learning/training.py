@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import torch
 from pydantic.dataclasses import dataclass as pydantic_dataclass
@@ -28,9 +28,11 @@ from hyuav._support.parameters import (
 from hyuav._support.recording import COMPILATION_ERRORS, has_compiler
 from hyuav.envs.arguments import as_device
 from hyuav.learning.algorithm import AlgorithmParameters
-from hyuav.learning.cohort import Cohort, Earned, Learner
+from hyuav.learning.checkpoint import require_entries, require_like
+from hyuav.learning.compile import FlownEpisode
 from hyuav.learning.memory import require_memory
-from hyuav.learning.state import require_entries, require_like, require_state
+from hyuav.learning.policy import NoiseFreeReturn
+from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
 from hyuav.physics.scenario import Scenario
 
@@ -73,15 +75,6 @@ class TrainingParameters(Parameters):
         return {name: getattr(self, name) for name in names}
 
 
-class Evaluation(NamedTuple):
-    """What all actors earn without noise; see :class:`hyuav.learning.cohort.Earned`."""
-
-    reward: Tensor
-    """(N,) bps/Hz."""
-    sum_rate: Tensor
-    """(N,) bps/Hz."""
-
-
 @dataclass(frozen=True)
 class Episode:
     """What one episode of training brought to each of the N learners."""
@@ -94,7 +87,7 @@ class Episode:
     """(N,) bps/Hz, with exploration and penalties, undiscounted."""
     losses: dict[str, Tensor]
     """(N,) mean loss of the episode's updates, by gradient step; NaN where there was none."""
-    evaluation: Evaluation | None
+    evaluation: NoiseFreeReturn | None
     """Without noise, in the episodes that end with an evaluation."""
     learning: tuple[bool, ...]
     """Whether each learner's numbers count: those of one that has stopped do not."""
@@ -139,10 +132,11 @@ class Training:
         on_cpu = as_device(device).type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
         longest = max(self.horizons)
-        if algorithm.keeps_flights and parameters.replay_size < longest:
+        if parameters.replay_size < algorithm.least_replay(longest):
             accepted = f"at least the {longest} slots of a flight, to keep the best"
             raise InputError(rejection("replay_size", parameters.replay_size, accepted))
-        require_memory(scenario, self.horizons, algorithm, parameters.sizes, as_device(device))
+        needs = algorithm.needed_memory(scenario, self.horizons, parameters.sizes)
+        require_memory(needs, len(self.learners), as_device(device))
         self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
         self.cohorts = [
             Cohort(
@@ -228,12 +222,12 @@ class Training:
                 flown = list(pool.map(Cohort.fly, self.cohorts))
         else:
             flown = [cohort.fly() for cohort in self.cohorts]
-        rewards, losses, _ = zip(*flown, strict=True)
+        rewards = [own.reward for own in flown]
         return Episode(
             number=self.episode,
             slots=tuple(self.episode * horizon for horizon in self.horizons),
             accumulated_reward=self._in_order(rewards),
-            losses={name: self._in_order(_loss(losses, name, rewards)) for name in self.steps},
+            losses={name: self._in_order(_mean_loss(flown, name)) for name in self.steps},
             evaluation=self._keep_best() if self._evaluation_is_due() else None,
             learning=tuple(not slot for slot in self.stopped),
         )
@@ -270,30 +264,23 @@ class Training:
         last = self.episode == self.parameters.num_episodes
         return last or self.episode % self.parameters.evaluation_every == 0
 
-    def evaluate(self, scheme: str | None = None) -> Evaluation:
+    def evaluate(self, scheme: str | None = None) -> NoiseFreeReturn:
         """Fly the current actors without noise, all through the same fading every time.
 
         Args:
             scheme: that all learners fly; None for each learner's own.
         """
-        return self._together(self._evaluate(scheme))
+        evaluated = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
+        return self._together([cohort.evaluate(*evaluated, scheme) for cohort in self.cohorts])
 
-    def _evaluate(self, scheme: str | None) -> list[Earned]:
-        episodes, seed = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
-        return [cohort.evaluate(episodes, seed, scheme) for cohort in self.cohorts]
-
-    def _together(self, earned: Sequence[Earned]) -> Evaluation:
-        return Evaluation(
-            self._in_order([own.reward for own in earned]),
-            self._in_order([own.sum_rate for own in earned]),
-        )
-
-    def _keep_best(self) -> Evaluation:
+    def _keep_best(self) -> NoiseFreeReturn:
         """Evaluate; where a learner has never been better, its weights are the best so far."""
-        evaluations = self._evaluate(None)
-        for cohort, evaluation in zip(self.cohorts, evaluations, strict=True):
-            cohort.keep_best(evaluation)
-        return self._together(evaluations)
+        evaluated = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
+        return self._together([cohort.keep_best(*evaluated) for cohort in self.cohorts])
+
+    def _together(self, earned: Sequence[NoiseFreeReturn]) -> NoiseFreeReturn:
+        rewards, sum_rates = zip(*earned, strict=True)
+        return NoiseFreeReturn(self._in_order(rewards), self._in_order(sum_rates))
 
     def load_weights(self, weights: dict[str, Tensor]) -> None:
         """Put weights into all learners' networks and targets.
@@ -349,7 +336,7 @@ class Training:
             can_compile = checked(bool, "can_compile", state["can_compile"])
             cohorts = list(zip(self.cohorts, state["cohorts"], strict=True))
             for index, (cohort, own) in enumerate(cohorts):
-                require_state(f"cohorts[{index}]", own, cohort)
+                cohort.require_state(f"cohorts[{index}]", own)
                 require_like(f"cohorts[{index}].episode", own["episode"], cohorts[0][1]["episode"])
             for cohort, own in cohorts:
                 cohort.load_state_dict(own)
@@ -376,10 +363,9 @@ def _partition(horizons: Sequence[int], threads: int, largest: float) -> list[li
     return parts
 
 
-def _loss(losses: Sequence[dict[str, Tensor]], name: str, like: Sequence[Tensor]) -> list[Tensor]:
+def _mean_loss(flown: Sequence[FlownEpisode], name: str) -> list[Tensor]:
     """One gradient step's mean loss in each cohort, NaN in those that did not take it."""
-    missing = [torch.full_like(values, torch.nan) for values in like]
-    return [own.get(name, none) for own, none in zip(losses, missing, strict=True)]
+    return [own.losses.get(name, torch.full_like(own.reward, torch.nan)) for own in flown]
 
 
 @contextmanager

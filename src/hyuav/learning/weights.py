@@ -74,6 +74,17 @@ def _mask(where: Tensor, values: Tensor) -> Tensor:
     return where.reshape(-1, *(1,) * (min(values.ndim, 3) - 1))
 
 
+def begin_moments(optimizer: torch.optim.Optimizer) -> None:
+    """Give an optimizer of Adam's kind the state that it would make in its first step."""
+    for group in optimizer.param_groups:
+        for weight in group["params"]:
+            optimizer.state[weight] = {
+                "step": torch.zeros((), device=weight.device),
+                "exp_avg": torch.zeros_like(weight),
+                "exp_avg_sq": torch.zeros_like(weight),
+            }
+
+
 def forget_moments(optimizer: torch.optim.Optimizer, where: Tensor) -> None:
     """Let the optimizer know nothing of the gradients of the learners ``where`` (N,)."""
     for state in optimizer.state.values():

@@ -19,8 +19,8 @@ def test_few_learners_are_one_shard() -> None:
 
 
 def test_a_piece_is_left_out_where_an_algorithm_has_it() -> None:
-    options = Compare(algorithm=("ddpg_robust", "ddpg", "sac"), without=("action_stretch", "clock"))
-    without = ("ddpg_robust-action_stretch", "ddpg_robust-clock")
+    options = Compare(algorithm=("ddpg_robust", "ddpg", "sac"), without=("action_scale", "clock"))
+    without = ("ddpg_robust-action_scale", "ddpg_robust-clock")
     assert options.entries == ("ddpg_robust", *without, "ddpg", "sac")
     assert parameters_of("ddpg_robust-clock").clock is False
-    assert parameters_of("sac-action_stretch") == parameters_of("sac")
+    assert parameters_of("sac-action_scale") == parameters_of("sac")

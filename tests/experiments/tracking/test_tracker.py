@@ -19,8 +19,8 @@ from hyuav.experiments.tracking import LoggerParameters, Tracker, learner_names
 from hyuav.experiments.tracking.checkpoints import restore
 from hyuav.experiments.tracking.session import remembered
 from hyuav.learning.checkpoint import load_checkpoint
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from offline_wandb import (
     history,

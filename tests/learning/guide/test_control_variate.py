@@ -1,4 +1,4 @@
-"""Rewards without the luck of the fading."""
+"""Rewards without what the fading brought by chance."""
 
 import dataclasses
 
@@ -6,17 +6,30 @@ import pytest
 import torch
 from tensordict import TensorDict, TensorDictBase
 
-from hyuav import Scenario
+from hyuav import Guide, RobustDDPG, Scenario
+from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.algorithm import adam
-from hyuav.learning.cohort import Cohort, Learner
-from hyuav.learning.ddpg import DDPG
-from hyuav.learning.guide.control_variate import LUCK, ControlVariate
+from hyuav.learning.guide.control_variate import CONTROL_TERM, ControlVariate
 from hyuav.learning.replay import FADING
+from hyuav.learning.train import Cohort, Learner
 from hyuav.physics.slot import Physics
 from reference import hover
 
 SCENARIO = Scenario.preset("random_disk")
 PHYSICS = Physics(SCENARIO)
+
+
+def variate_of(scale: float) -> ControlVariate:
+    afterstate = Afterstate(SCENARIO, 0.02, clock=False, geofence=True)
+    return ControlVariate(1, SCENARIO, afterstate, (64, 64), scale)
+
+
+def guided(scenario: Scenario, seeds: list[int], replay_size: int, batch_size: int) -> Cohort:
+    """Learners whose guide is a control variate and no more."""
+    guide = Guide(warm_up_episodes=0, repeat_every=0, imagined_flights=0, imitation_weight=0.0)
+    algorithm = RobustDDPG(hidden_sizes=(8,), clock=False, reward_scale=0.1, guide=guide)
+    learners = [Learner("relay", seed) for seed in seeds]
+    return Cohort(scenario, learners, algorithm, replay_size, batch_size, None)
 
 
 def slots(size: int, seed: int, spread: float = 30.0) -> TensorDictBase:
@@ -39,72 +52,70 @@ def slots(size: int, seed: int, spread: float = 30.0) -> TensorDictBase:
 
 def test_whatever_its_weights_it_leaves_the_mean_reward_as_it_is() -> None:
     torch.manual_seed(0)
-    variate = ControlVariate(1, SCENARIO, 1.0, clock=False)
+    variate = variate_of(1.0)
     batch = slots(200_000, 1)
-    fair = variate.fair(batch)
-    luck = batch["next", "reward"] - fair["next", "reward"]
-    error = luck.std() / len(luck.flatten()) ** 0.5
-    assert luck.std() > 0.1
-    assert abs(luck.mean()) < 4.0 * error
-    torch.testing.assert_close(fair[LUCK], luck)
+    adjusted = variate.adjust(batch)
+    control_term = batch["next", "reward"] - adjusted["next", "reward"]
+    error = control_term.std() / len(control_term.flatten()) ** 0.5
+    assert control_term.std() > 0.1
+    assert abs(control_term.mean()) < 4.0 * error
+    torch.testing.assert_close(adjusted[CONTROL_TERM], control_term)
 
 
 def test_it_learns_to_take_most_of_the_variance_off() -> None:
     torch.manual_seed(0)
-    variate = ControlVariate(1, SCENARIO, 1.0, clock=False)
+    variate = variate_of(1.0)
     optimizer = adam(variate, 3e-3)
     for step in range(600):
         optimizer.zero_grad()
-        variate.loss(variate.fair(slots(200, step))).mean().backward()
+        variate.loss(variate.adjust(slots(200, step))).mean().backward()
         optimizer.step()
     batch = slots(20_000, 9999, spread=0.0)  # all at one place
-    before, after = batch["next", "reward"], variate.fair(batch)["next", "reward"]
+    before, after = batch["next", "reward"], variate.adjust(batch)["next", "reward"]
     assert after.var() < 0.15 * before.var()
     assert after.mean().item() == pytest.approx(before.mean().item(), abs=0.02)
 
 
 def test_the_mode_which_depends_on_the_fading_is_not_looked_at() -> None:
     torch.manual_seed(0)
-    variate = ControlVariate(1, SCENARIO, 1.0, clock=False)
+    variate = variate_of(1.0)
     batch = slots(5, 0)
     other = batch.clone()
     other["next", "observation"][..., 2] *= -1.0
-    assert torch.equal(variate.luck(batch), variate.luck(other))
+    assert torch.equal(variate.control_term(batch), variate.control_term(other))
 
 
-def test_scaled_rewards_have_scaled_luck() -> None:
+def test_scaled_rewards_have_a_scaled_control_term() -> None:
     variates = []
     for scale in (1.0, 0.1):
         torch.manual_seed(0)
-        variates.append(ControlVariate(1, SCENARIO, scale, clock=False))
+        variates.append(variate_of(scale))
     batch = slots(5, 0)
-    torch.testing.assert_close(variates[1].luck(batch), 0.1 * variates[0].luck(batch))
+    torch.testing.assert_close(
+        variates[1].control_term(batch), 0.1 * variates[0].control_term(batch)
+    )
 
 
-def test_without_fading_there_is_no_luck() -> None:
+def test_without_fading_nothing_is_taken_off() -> None:
     scenario = dataclasses.replace(SCENARIO, num_slots=4, fading=False)
-    algorithm = DDPG(hidden_sizes=(8,), control_variate=True, repeat_every=2)
-    trained = Cohort(scenario, [Learner("relay", 0)], algorithm, 40, 8, None)
+    trained = guided(scenario, [0], 40, 8)
     for _ in range(6):
         trained.fly()
     batch = trained.replay.sample()
     assert torch.equal(batch[FADING], torch.ones_like(batch[FADING]))
-    fair = trained.algorithm.fair(batch)
-    assert torch.equal(fair["next", "reward"], batch["next", "reward"])
+    adjusted = trained.algorithm.guide.prepare(batch)
+    assert torch.equal(adjusted["next", "reward"], batch["next", "reward"])
 
 
 def test_each_learner_has_a_control_variate_of_its_own_that_learns() -> None:
     scenario = dataclasses.replace(SCENARIO, num_slots=4)
-    algorithm = DDPG(hidden_sizes=(8,), control_variate=True)
 
     def weights(seeds: list[int], episodes: int) -> torch.Tensor:
-        learners = [Learner("relay", seed) for seed in seeds]
-        trained = Cohort(scenario, learners, algorithm, 40, 8, None)
+        trained = guided(scenario, seeds, 40, 8)
         for _ in range(episodes):
             trained.fly()
-        expectation = trained.algorithm.expectation
-        assert expectation is not None
-        return torch.cat([each.detach().flatten(1) for each in expectation.parameters()], dim=1)
+        own = trained.algorithm.guide.parameters()
+        return torch.cat([each.detach().flatten(1) for each in own], dim=1)
 
     begun, later = weights([3, 4], 1), weights([3, 4], 4)
     assert not torch.equal(begun[0], begun[1])
@@ -112,15 +123,13 @@ def test_each_learner_has_a_control_variate_of_its_own_that_learns() -> None:
     torch.testing.assert_close(weights([4], 4)[0], later[1])
 
 
-def test_evaluations_are_told_without_their_luck_and_with_the_same_mean() -> None:
+def test_evaluations_are_told_without_chance_and_with_the_same_mean() -> None:
     scenario = dataclasses.replace(SCENARIO, num_slots=4)
-    algorithm = DDPG(hidden_sizes=(8,), control_variate=True, reward_scale=0.1)
-    trained = Cohort(scenario, [Learner("relay", 0)], algorithm, 400, 50, None)
+    trained = guided(scenario, [0], 400, 50)
     for _ in range(60):
         trained.fly()
     earned = [trained.evaluate(20, seed) for seed in range(60)]
-    fair = torch.cat([own.reward for own in earned])
-    lucky = torch.cat([own.sum_rate for own in earned])
-    assert fair.std() < 0.7 * lucky.std()
-    assert abs((fair - lucky).mean()) < 4.0 * (fair - lucky).std() / 60**0.5
-    assert earned[0].way.shape == (4, 1, 2)
+    adjusted = torch.cat([own.reward for own in earned])
+    raw = torch.cat([own.sum_rate for own in earned])
+    assert adjusted.std() < 0.7 * raw.std()
+    assert abs((adjusted - raw).mean()) < 4.0 * (adjusted - raw).std() / 60**0.5

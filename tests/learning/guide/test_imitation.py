@@ -9,18 +9,32 @@ from tensordict import TensorDictBase
 from torch import Tensor
 
 from batches import TEN_UES, mini_batch
+from hyuav import Guide
 from hyuav._support.randomness import given_normals
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.guide.demonstrations import BestFlights
-from hyuav.learning.guide.imitation import CLEARLY, Alternatives
+from hyuav.learning.guide.demonstrations import Demonstrations
+from hyuav.learning.guide.imitation import Imitation
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
+from hyuav.learning.train import update_networks, update_targets
 
 KINDS: list[Any] = [DDPG, TD3, SAC]
 
-LITTLE = 1.8 * CLEARLY
+MARGIN = Guide().q_margin
+
+LITTLE = 1.8 * MARGIN
 """A slope at which hovering, from half speed, gains less than what counts."""
+
+
+def imitating(
+    algorithm: Algorithm, weight: float, *, clock: bool = False
+) -> tuple[Algorithm, Demonstrations]:
+    """An algorithm whose learners are drawn to what is demonstrated, and their best flights."""
+    learners = next(iter(algorithm.actor.parameters())).shape[0]
+    flights = Demonstrations(learners, TEN_UES, 0.005)
+    imitation = Imitation(algorithm, flights, Guide(imitation_weight=weight), clock=clock)
+    return imitation.attach(0.95), flights
 
 
 def flying_along_x(kind: Any, weight: float, slope: float) -> Algorithm:
@@ -29,7 +43,7 @@ def flying_along_x(kind: Any, weight: float, slope: float) -> Algorithm:
     Of their hidden units all but the first are cut off, so that they hold that flying at the
     speed v along x is worth slope * v.
     """
-    parameters: AlgorithmParameters = kind(hidden_sizes=(8,), alternatives_weight=weight)
+    parameters: AlgorithmParameters = kind(hidden_sizes=(8,))
     algorithm = parameters.build(1, TEN_UES)
     with torch.no_grad():
         for name, values in algorithm.loss.state_dict().items():
@@ -41,7 +55,7 @@ def flying_along_x(kind: Any, weight: float, slope: float) -> Algorithm:
                     values[..., 15, 0] = 1e-3  # behind the observation
                 elif "value" in name and name.endswith("2.weight"):
                     values[..., 0, 0] = 1e3 * slope
-    return algorithm
+    return imitating(algorithm, weight)[0] if weight else algorithm
 
 
 def actor_loss(algorithm: Algorithm, batch: TensorDictBase) -> Tensor:
@@ -52,15 +66,13 @@ def actor_loss(algorithm: Algorithm, batch: TensorDictBase) -> Tensor:
 
 @pytest.mark.parametrize("clock", [False, True])
 def test_they_are_to_hover_and_with_a_clock_to_join_the_best_flight(clock: bool) -> None:
-    flights, observation = BestFlights(1, TEN_UES), torch.zeros(1, 1, 15 + clock)
-    flights.way[10, 0] = torch.tensor([0.1, -0.9])  # after the slot that the clock tells
-    loss = DDPG(hidden_sizes=(8,), clock=clock).build(1, TEN_UES).loss
-    alternatives = Alternatives(
-        loss, "value_network", lambda batch: batch["action"], flights, 1.0, clock=clock
-    )
+    flights, observation = Demonstrations(1, TEN_UES, 0.005), torch.zeros(1, 1, 15 + clock)
+    flights.trajectory[10, 0] = torch.tensor([0.1, -0.9])  # after the slot that the clock tells
+    algorithm = DDPG(hidden_sizes=(8,), clock=clock).build(1, TEN_UES)
+    imitation = Imitation(algorithm, flights, Guide(), clock=clock)
     expected = [[0.0, 0.0], [0.5, -1.0]]
     torch.testing.assert_close(
-        alternatives.actions(observation), torch.tensor(expected[: 1 + clock])[None, :, None]
+        imitation.actions(observation), torch.tensor(expected[: 1 + clock])[None, :, None]
     )
 
 
@@ -86,7 +98,7 @@ def test_the_target_counts_the_best_one_where_it_is_clearly_better(kind: Any, sl
     algorithm = flying_along_x(kind, 1.0, slope)
     with given_normals(iter([torch.zeros(1, 5, 2)])):
         loss = algorithm.steps[0].loss(batch.clone())
-    following = max(0.5 * slope, -CLEARLY)
+    following = max(0.5 * slope, -MARGIN)
     critics = 1 + (kind is TD3)
     expected = torch.full((1, 5), critics * (2.0 + 0.95 * following) ** 2)
     expected[:, 0] = critics * 2.0**2
@@ -100,18 +112,18 @@ def test_the_target_of_a_stochastic_actor_counts_it_too() -> None:
     algorithm = flying_along_x(SAC, 1.0, -400.0)  # for which any speed is worth far less
     with given_normals(iter([torch.zeros(1, 5, 2)])):
         loss = algorithm.steps[0].loss(batch.clone())
-    expected = torch.full((1, 5), 2 * (2.0 - 0.95 * CLEARLY) ** 2)
+    expected = torch.full((1, 5), 2 * (2.0 - 0.95 * MARGIN) ** 2)
     torch.testing.assert_close(loss, expected, rtol=1e-3, atol=0.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_weighing_them_leaves_the_targets_without_gradients(kind: Any) -> None:
     torch.manual_seed(0)
-    algorithm = kind(hidden_sizes=(8,), alternatives_weight=1.0).build(2, TEN_UES)
+    algorithm, _ = imitating(kind(hidden_sizes=(8,)).build(2, TEN_UES), 1.0)
     for index in range(1, 5):
         batch = mini_batch(2, 20)
-        algorithm.update_networks(batch, index)
-        algorithm.update_targets(index)
+        update_networks(algorithm, batch, index)
+        update_targets(algorithm, index)
     for name, values in algorithm.loss.named_buffers():
         assert not values.requires_grad, name
 
@@ -119,17 +131,17 @@ def test_weighing_them_leaves_the_targets_without_gradients(kind: Any) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_actor_that_is_behind_joins_the_best_flight_whatever_its_critics_hold(kind: Any) -> None:
     torch.manual_seed(0)
-    algorithm = kind(clock=True, hidden_sizes=(8,), alternatives_weight=1.0).build(2, TEN_UES)
     unweighed = kind(clock=True, hidden_sizes=(8,)).build(2, TEN_UES)
-    unweighed.loss.load_state_dict(algorithm.loss.state_dict())
-    flights = algorithm.best_flights
-    flights.way.fill_(0.3)
+    built = kind(clock=True, hidden_sizes=(8,)).build(2, TEN_UES)
+    built.loss.load_state_dict(unweighed.loss.state_dict())
+    algorithm, flights = imitating(built, 1.0, clock=True)
+    flights.trajectory.fill_(0.3)
     batch = mini_batch(2, 5, observation_size=16)
     plain, before = actor_loss(unweighed, batch), actor_loss(algorithm, batch)
     flights.behind[1] = True
     after = actor_loss(algorithm, batch)
     action = algorithm.actor(batch.clone())["action"]
-    away = (action - flights.towards(batch["observation"])).square().sum(dim=-1)
+    away = (action - flights.demonstrate(batch["observation"])).square().sum(dim=-1)
     torch.testing.assert_close(after[1] - plain[1], away[1])
     torch.testing.assert_close(after[0], before[0])
     assert not torch.allclose(after[1], before[1])

@@ -1,41 +1,37 @@
-"""Which flights are kept, tried and joined."""
+"""Which flights are kept, planned and joined."""
 
 import copy
 import dataclasses
-from typing import Any
 
 import pytest
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 
-from hyuav import Scenario
-from hyuav.learning.cohort import Cohort, Learner
-from hyuav.learning.ddpg import DDPG
-from hyuav.learning.guide.control_variate import ControlVariate
-from hyuav.learning.guide.demonstrations import AHEAD, BestFlights
-from hyuav.learning.guide.planner import FlightSearch
-from hyuav.learning.guide.proposals import Imagination
-from hyuav.learning.guide.reward_model import Expectation
-from hyuav.physics.slot import Physics
+from hyuav import Guide, InputError, RobustDDPG, Scenario, make_env
+from hyuav.learning.guide.demonstrations import Demonstrations
+from hyuav.learning.guide.parameters import OFF
+from hyuav.learning.guide.planner import Planner
+from hyuav.learning.guide.reward_model import RewardModel
+from hyuav.learning.train import Cohort, Learner
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
+GUIDE = Guide(warm_up_episodes=3)
 
 
-class FarIsBetter(Expectation):
-    """Expects as much as the helper is far along x, and guesses as much as it is along -y."""
+def far_is_better(_: RewardModel, trajectory: Tensor) -> tuple[Tensor, Tensor]:
+    """Expect as much as the helper is far along x, and guess as much as it is along -y."""
+    x, y = trajectory.sum(dim=0).unbind(dim=-1)
+    return x, -y
 
-    def __init__(self, learners: int) -> None:
-        variate = ControlVariate(learners, SCENARIO, 1.0, clock=True)
-        super().__init__(learners, variate, 1.0)
-        self.updates = 0
 
-    def update(self, memory: TensorDictBase, normals: Tensor) -> None:  # noqa: ARG002
-        self.updates += 1
-
-    def of(self, way: Tensor) -> tuple[Tensor, Tensor]:
-        x, y = way.sum(dim=0).unbind(dim=-1)
-        return x, -y
+@pytest.fixture
+def updates(monkeypatch: pytest.MonkeyPatch) -> list[Tensor]:
+    """The numbers by which a reward model that knows its answers was updated."""
+    made: list[Tensor] = []
+    monkeypatch.setattr(RewardModel, "judge", far_is_better)
+    monkeypatch.setattr(RewardModel, "update", lambda *given: made.append(given[-1]))
+    return made
 
 
 def flown(x: float, learners: int = 2) -> TensorDictBase:
@@ -46,94 +42,127 @@ def flown(x: float, learners: int = 2) -> TensorDictBase:
     return TensorDict(action=action, next=after, batch_size=[6, learners])
 
 
-def search(imagined: int = 0) -> tuple[FlightSearch, BestFlights, FarIsBetter]:
-    flights, expectation = BestFlights(2, SCENARIO), FarIsBetter(2)
-    physics = Physics(SCENARIO)
-    imagination = Imagination(imagined, physics, ["hybrid"] * 2) if imagined else None
-    return FlightSearch(flights, expectation, imagination, [1, 2]), flights, expectation
+def planner(imagined: int = 0) -> Planner:
+    env = make_env(SCENARIO, ["hybrid"] * 2, (2,), seed=[1, 2], clock=True)
+    guide = dataclasses.replace(GUIDE, imagined_flights=imagined)
+    return Planner(guide, RobustDDPG(guide=guide), env, [1, 2])
 
 
-def test_the_flight_of_which_most_is_expected_is_kept_and_tried() -> None:
-    searching, flights, expectation = search()
+def test_the_flight_of_which_most_is_expected_is_kept_and_planned(updates: list[Tensor]) -> None:
+    planning = planner()
     for episode, x in enumerate([-0.2, 0.4, 0.1], start=1):
-        searching.go_on(flown(x), flown(x), episode, imagines=True)
-    assert torch.equal(flights.way, flown(0.4)["next", "observation"])
-    assert torch.equal(flights.tried_actions, flown(0.4)["action"])
-    torch.testing.assert_close(flights.reward, torch.full((2,), 2.4))
-    assert expectation.updates == 1
+        planning.end_episode(episode, flown(x), flown(x))
+    flights = planning.flights
+    assert torch.equal(flights.trajectory, flown(0.4)["next", "observation"])
+    assert torch.equal(flights.planned_actions, flown(0.4)["action"])
+    torch.testing.assert_close(flights.best_return, torch.full((2,), 2.4))
+    assert len(updates) == 1
 
 
-def test_of_the_imagined_ones_the_best_is_kept_and_that_of_the_best_guess_tried() -> None:
-    searching, flights, _ = search(imagined=30)
-    searching.go_on(flown(-0.6), flown(-0.6), 3, imagines=True)
-    far = (flights.way[-1, :, 0] > 0.3).all()  # six slots from the start at -0.6
-    low = (flights.tried_way[-1, :, 1] < -0.9).all()
+@pytest.mark.usefixtures("updates")
+def test_of_the_imagined_ones_the_best_is_kept_and_that_of_the_best_guess_planned() -> None:
+    planning = planner(imagined=30)
+    planning.end_episode(7, flown(-0.6), flown(-0.6))
+    flights = planning.flights
+    far = (flights.trajectory[-1, :, 0] > 0.3).all()  # six slots from the start at -0.6
+    low = (flights.planned_trajectory[-1, :, 1] < -0.9).all()
     assert far
     assert low
-    torch.testing.assert_close(flights.reward, flights.way[..., 0].sum(dim=0))
+    torch.testing.assert_close(flights.best_return, flights.trajectory[..., 0].sum(dim=0))
 
 
+@pytest.mark.usefixtures("updates")
 def test_nothing_is_imagined_during_the_warm_up() -> None:
-    searching, flights, _ = search(imagined=30)
-    searching.go_on(flown(-0.6), flown(-0.6), 3, imagines=False)
-    assert torch.equal(flights.tried_way, flown(-0.6)["next", "observation"])
+    planning = planner(imagined=30)
+    planning.guide = dataclasses.replace(planning.guide, warm_up_episodes=4)
+    planning.end_episode(3, flown(-0.6), flown(-0.6))
+    flights = planning.flights
+    assert torch.equal(flights.planned_trajectory, flown(-0.6)["next", "observation"])
 
 
-@pytest.mark.parametrize(("share", "behind"), [(1.0 - 2.0 * AHEAD, True), (1.0, False)])
+@pytest.mark.usefixtures("updates")
+@pytest.mark.parametrize(
+    ("share", "behind"), [(1.0 - 2.0 * Guide().return_margin, True), (1.0, False)]
+)
 def test_who_flies_clearly_worse_than_the_best_flight_is_behind(share: float, behind: bool) -> None:
-    searching, flights, _ = search()
-    searching.go_on(flown(0.5), flown(0.5), 1, imagines=False)
+    planning = planner()
+    flights = planning.flights
+    planning.end_episode(1, flown(0.5), flown(0.5))
     assert not flights.behind.any()  # no actor was evaluated yet
-    flights.own_way.copy_(share * flights.way)
-    searching.go_on(flown(0.1), flown(0.1), 2, imagines=False)
+    planning.end_evaluation(share * flights.trajectory)
+    planning.end_episode(2, flown(0.1), flown(0.1))
     assert flights.behind.tolist() == [behind] * 2
 
 
-def cohort(**hyperparameters: Any) -> Cohort:
-    algorithm = DDPG(
-        hidden_sizes=(8,),
-        clock=True,
-        control_variate=True,
-        warm_up_episodes=3,
-        repeat_every=2,
-        imagined_flights=40,
-        **hyperparameters,
-    )
+def cohort() -> Cohort:
+    guide = Guide(warm_up_episodes=3, update_every=2, repeat_every=2, imagined_flights=40)
+    algorithm = RobustDDPG(hidden_sizes=(8,), guide=guide)
     learners = [Learner("jamming", 1), Learner("hybrid", 2)]
     return Cohort(SCENARIO, learners, algorithm, 60, 8, None)
 
 
-def best(trained: Cohort) -> BestFlights:
-    assert trained.algorithm.best_flights is not None
-    return trained.algorithm.best_flights
+def best(trained: Cohort) -> Demonstrations:
+    planning = trained.algorithm.guide
+    assert isinstance(planning, Planner)
+    return planning.flights
 
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_what_was_imagined_is_flown_after_the_warm_up(
     compiled: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Expectation, "of", FarIsBetter.of)
+    monkeypatch.setattr(RewardModel, "judge", far_is_better)
     trained = cohort()
     for _ in range(3):
         trained.fly()
-    tried = best(trained).tried_actions.clone()
-    assert (best(trained).tried_way[-1, :, 1] < -0.9).all()
+    planned = best(trained).planned_actions.clone()
+    assert (best(trained).planned_trajectory[-1, :, 1] < -0.9).all()
     if compiled:
         trained.compile()
     trained.fly()
-    stored = trained.replay.storage._storage["action"][18:24]
-    torch.testing.assert_close(stored, tried)
+    stored = trained.stored["action"][18:24]
+    torch.testing.assert_close(stored, planned)
 
 
-def test_the_search_goes_on_with_a_training_that_is_resumed() -> None:
+def test_the_planner_goes_on_with_a_training_that_is_resumed() -> None:
     first, second = cohort(), cohort()
     for _ in range(6):
         first.fly()
-    first.keep_best(first.evaluate(10, seed=0))
+    first.keep_best(10, seed=0)
     second.load_state_dict(copy.deepcopy(first.state_dict()))  # not one memory for both
     for trained in (first, second):
         for _ in range(5):
             trained.fly()
     for name, values in best(first).state_dict().items():
         torch.testing.assert_close(values, best(second).state_dict()[name], rtol=0.0, atol=0.0)
-    assert not torch.equal(best(first).tried_way, best(first).way)
+    assert not torch.equal(best(first).planned_trajectory, best(first).trajectory)
+
+
+def test_a_flight_is_planned_in_the_episode_before_the_one_that_flies_it() -> None:
+    for every in (1, 2, 4):
+        guide = Guide(warm_up_episodes=7, update_every=every, repeat_every=4)
+        repeated = [episode for episode in range(1, 30) if guide.repeats(episode)]
+        assert repeated == [8, 12, 16, 20, 24, 28]
+        assert all(guide.updates(episode - 1) for episode in repeated)
+    refusal = "^repeat_every = 6: expected a multiple of update_every = 4, or 0$"
+    with pytest.raises(InputError, match=refusal):
+        Guide(repeat_every=6)
+
+
+@pytest.mark.parametrize(
+    "off", [{"control_variate": False}, {"repeat_every": 0, "imitation_weight": 0.0}]
+)
+def test_flights_are_not_imagined_in_vain(off: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=r"^imagined_flights = 64: expected 0 without"):
+        Guide(**off)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("piece", list(OFF))
+def test_a_guide_does_without_any_piece(piece: str) -> None:
+    guide = Guide(warm_up_episodes=3).without(piece)
+    assert not getattr(guide, piece)
+    algorithm = RobustDDPG(hidden_sizes=(8,), guide=guide)
+    trained = Cohort(SCENARIO, [Learner("jamming", 1)], algorithm, 60, 8, None)
+    for _ in range(5):
+        trained.fly()
+    assert not trained.stopped.any()

@@ -6,14 +6,15 @@ from typing import Any
 import pytest
 import torch
 
-from hyuav import Scenario, make_env
-from hyuav.learning.guide.demonstrations import BestFlights
-from hyuav.learning.guide.proposals import Imagination
+from hyuav import Guide, Scenario, make_env
+from hyuav.learning.guide.demonstrations import Demonstrations
+from hyuav.learning.guide.proposals import TrajectoryProposals
 from hyuav.physics.slot import Physics
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
 
 
+SCHEMES = ["hybrid", "relay"]
 DEAR = {"jamming_power": 1000.0}  # a helper that may jam has less left to fly
 SMALL = {
     "map_side": 60.0,
@@ -25,15 +26,21 @@ SMALL = {
 }
 
 
-def flights(scenario: Scenario) -> BestFlights:
-    """The best hovers at the start, the one that was tried flies along x."""
-    known = BestFlights(2, scenario)
+def flights(scenario: Scenario) -> Demonstrations:
+    """The best hovers at the start, the one that is planned flies along x."""
+    known = Demonstrations(2, scenario, 0.005)
     start = torch.tensor(scenario.helper_starts[0]) / (scenario.map_side / 2)
-    known.way.copy_(start.expand_as(known.way))
+    known.trajectory.copy_(start.expand_as(known.trajectory))
     reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
-    known.tried_way.copy_(known.way)
-    known.tried_way[..., 0] += 0.5 * reach * torch.arange(1.0, scenario.num_slots + 1.0)[:, None]
+    known.planned_trajectory.copy_(known.trajectory)
+    slots = torch.arange(1.0, scenario.num_slots + 1.0)[:, None]
+    known.planned_trajectory[..., 0] += 0.5 * reach * slots
     return known
+
+
+def proposing(imagined: int, scenario: Scenario = SCENARIO) -> TrajectoryProposals:
+    system = Physics(scenario)
+    return TrajectoryProposals(Guide(imagined_flights=imagined), system, SCHEMES)
 
 
 def normals(imagined: int) -> torch.Tensor:
@@ -44,44 +51,43 @@ def normals(imagined: int) -> torch.Tensor:
 @pytest.mark.parametrize("geofence", [False, True])
 def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofence: bool) -> None:
     scenario = dataclasses.replace(SCENARIO, **changes)
-    schemes = ["hybrid", "relay"]
-    imagination = Imagination(35, Physics(scenario), schemes)
-    actions, way = imagination.fly(3, flights(scenario), normals(35))
-    assert actions.shape == way.shape == (6, 2, 70, 2)
-    env = make_env(scenario, schemes, (2, 70), seed=0, geofence=geofence)
+    proposals = proposing(35, scenario)
+    actions, trajectory = proposals.fly(3, flights(scenario), normals(35))
+    assert actions.shape == trajectory.shape == (6, 2, 70, 2)
+    env = make_env(scenario, SCHEMES, (2, 70), seed=0, geofence=geofence)
     state, half_side = env.reset(), scenario.map_side / 2
-    for action, place in zip(actions, way, strict=True):
+    for action, place in zip(actions, trajectory, strict=True):
         state = env.step_mdp(env.step(state.set("action", action)))
         assert not state["off_map"].any()
         flown = state["position"].squeeze(-2)
         torch.testing.assert_close(flown, place * half_side, atol=1e-3, rtol=0.0)
-    straight = way[:, :, :35]
+    straight = trajectory[:, :, :35]
     assert torch.equal(straight[:, 0], straight[:, 1]) == (changes != DEAR)
 
 
 def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_reached() -> None:
     scenario = dataclasses.replace(SCENARIO, num_slots=10)
-    imagination = Imagination(50, Physics(scenario), ["hybrid", "hybrid"])
+    proposals = proposing(50, scenario)
     known, drawn = flights(scenario), normals(50)
-    ways = [imagination.fly(episode, known, drawn)[1] for episode in range(40)]
-    ends = torch.stack([way[-1, 0, :50] for way in ways]).flatten(0, 1)
+    trajectories = [proposals.fly(episode, known, drawn)[1] for episode in range(40)]
+    ends = torch.stack([trajectory[-1, 0, :50] for trajectory in trajectories]).flatten(0, 1)
     assert len(ends.unique(dim=0)) > 0.5 * len(ends)  # those at the edges coincide
     for corner in ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 0.0), (-0.5, 0.6)):
         assert (ends - torch.tensor(corner)).norm(dim=-1).min() < 0.05
 
 
 def test_variations_lead_beside_the_flights_that_they_vary() -> None:
-    imagination = Imagination(400, Physics(SCENARIO), ["hybrid", "hybrid"])
+    proposals = proposing(400)
     known = flights(SCENARIO)
-    _, way = imagination.fly(1, known, normals(400))
-    of_best, of_tried = way[:, :, 400:600], way[:, :, 600:]
-    torch.testing.assert_close(of_best[:, :, 0], known.way)
-    for varied, model in ((of_best, known.way), (of_tried, known.tried_way)):
+    _, trajectory = proposals.fly(1, known, normals(400))
+    of_best, of_planned = trajectory[:, :, 400:600], trajectory[:, :, 600:]
+    torch.testing.assert_close(of_best[:, :, 0], known.trajectory)
+    for varied, model in ((of_best, known.trajectory), (of_planned, known.planned_trajectory)):
         away = (varied - model.unsqueeze(2)).norm(dim=-1)
         assert (away > 1e-6).float().mean() > 0.3
         assert 0.0 < away[away > 1e-6].median() < 0.1
         assert away.max() < 1.0
-    moved = (of_best - known.way.unsqueeze(2)).norm(dim=-1) > 1e-6
+    moved = (of_best - known.trajectory.unsqueeze(2)).norm(dim=-1) > 1e-6
     first, last = moved[0].float().mean(), moved[-1].float().mean()
     assert min(first, last) > 0.3  # some from the first slot on, some to the last
     assert (~moved.all(dim=0)).float().mean() > 0.3  # and most not all along

@@ -7,21 +7,25 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 
-from hyuav import Scenario
+from hyuav import Guide, Scenario
+from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.guide.control_variate import ControlVariate
-from hyuav.learning.guide.reward_model import MANY_UES, Expectation
+from hyuav.learning.guide.reward_model import RewardModel
 from hyuav.physics.layout import disk
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
+MOST = Guide().most_ue_features
 UES = torch.tensor(SCENARIO.ue_positions)
 POWERS = 3 * SCENARIO.num_ues + 2
 
 
-def expectation(
+def reward_model(
     learners: int = 1, scale: float = 0.05, scenario: Scenario = SCENARIO
-) -> Expectation:
+) -> RewardModel:
     torch.manual_seed(0)
-    return Expectation(learners, ControlVariate(learners, scenario, scale, clock=True), scale)
+    afterstate = Afterstate(scenario, 0.02, clock=True, geofence=True)
+    variate = ControlVariate(learners, scenario, afterstate, (64, 64), scale)
+    return RewardModel(learners, variate, scale, Guide())
 
 
 def earned(place: Tensor) -> Tensor:
@@ -33,7 +37,7 @@ def earned(place: Tensor) -> Tensor:
 
 
 def memory(places: Tensor, scale: float = 0.05) -> TensorDictBase:
-    """Slots (n, N) without luck that ended at ``places`` (n, N, 2)."""
+    """Slots (n, N) without chance that ended at ``places`` (n, N, 2)."""
     clock = torch.rand(len(places), 1, 1, generator=torch.Generator().manual_seed(3)) * 2.0 - 1.0
     clock = clock.expand(*places.shape[:-1], 1)
     after = TensorDict(
@@ -52,7 +56,7 @@ def around(center: tuple[float, float], spread: float, learners: int = 1) -> Ten
 
 
 def test_it_finds_a_sliver_of_coverage_that_was_never_visited() -> None:
-    regression = expectation()
+    regression = reward_model()
     places = around((-0.1, 0.0), 0.4)
     visited = earned(places).max()
     regression.update(memory(places), torch.zeros(1, regression.size))
@@ -60,7 +64,7 @@ def test_it_finds_a_sliver_of_coverage_that_was_never_visited() -> None:
         torch.linspace(-0.6, 0.4, 81), torch.linspace(-0.5, 0.5, 81), indexing="ij"
     )
     grid = torch.stack([x, y], dim=-1).reshape(1, 1, -1, 2)
-    expected, _ = regression.of(grid)
+    expected, _ = regression.judge(grid)
     truth = earned(grid).squeeze()
     assert truth.max() >= visited
     error = (expected.squeeze() - truth).abs()
@@ -69,18 +73,19 @@ def test_it_finds_a_sliver_of_coverage_that_was_never_visited() -> None:
 
 
 def test_a_flight_is_worth_the_sum_of_its_slots() -> None:
-    regression = expectation(2)
+    regression = reward_model(2)
     regression.update(memory(around((0.0, 0.0), 0.3, 2)), torch.zeros(2, regression.size))
-    way = torch.linspace(-0.3, 0.3, 5).reshape(5, 1, 1, 1).expand(5, 2, 3, 2)
-    expected, guessed = regression.of(way)
+    trajectory = torch.linspace(-0.3, 0.3, 5).reshape(5, 1, 1, 1).expand(5, 2, 3, 2)
+    expected, guessed = regression.judge(trajectory)
     assert expected.shape == guessed.shape == (2, 3)
-    torch.testing.assert_close(expected, earned(way).squeeze(-1).sum(dim=0), atol=0.4, rtol=0.0)
+    truth = earned(trajectory).squeeze(-1).sum(dim=0)
+    torch.testing.assert_close(expected, truth, atol=0.4, rtol=0.0)
 
 
 def test_guesses_differ_where_little_is_known() -> None:
-    regression = expectation()
+    regression = reward_model()
     known, unknown = (-0.3, 0.1), (0.9, -0.9)
-    way = torch.tensor([known, unknown]).reshape(1, 1, 2, 2)
+    trajectory = torch.tensor([known, unknown]).reshape(1, 1, 2, 2)
     guesses = []
     slots = memory(around(known, 0.1))
     noise = torch.randn(400, 1, 1, generator=torch.Generator().manual_seed(2))
@@ -91,20 +96,20 @@ def test_guesses_differ_where_little_is_known() -> None:
     for seed in range(40):
         normals = torch.randn(1, regression.size, generator=torch.Generator().manual_seed(seed))
         regression.update(slots, normals)
-        guesses.append(regression.of(way)[1].squeeze(0))
+        guesses.append(regression.judge(trajectory)[1].squeeze(0))
     spread = torch.stack(guesses).std(dim=0)
     assert spread[1] > 10.0 * spread[0]
 
 
 def test_without_normals_a_guess_is_what_is_expected() -> None:
-    regression = expectation()
+    regression = reward_model()
     regression.update(memory(around((0.0, 0.0), 0.3)), torch.zeros(1, regression.size))
     assert torch.equal(regression.mean, regression.guess)
     assert regression.mean.any()
 
 
 def test_what_cannot_be_solved_leaves_that_learner_as_it_was() -> None:
-    regression = expectation(2)
+    regression = reward_model(2)
     slots = memory(around((0.0, 0.0), 0.3, 2))
     slots["next", "reward"][:, 0] = torch.nan
     regression.update(slots, torch.zeros(2, regression.size))
@@ -114,7 +119,7 @@ def test_what_cannot_be_solved_leaves_that_learner_as_it_was() -> None:
 
 
 def test_a_memory_of_one_place_alone_can_be_learned_from() -> None:
-    regression = expectation()
+    regression = reward_model()
     slots = memory(torch.zeros(20, 1, 2)).apply(torch.zeros_like)
     for _ in range(3):
         regression.update(slots, torch.ones(1, regression.size))
@@ -125,7 +130,7 @@ def test_a_memory_of_one_place_alone_can_be_learned_from() -> None:
 
 def test_learners_share_nothing() -> None:
     places = around((0.0, 0.0), 0.3, 2)
-    together, alone = expectation(2), expectation(2)
+    together, alone = reward_model(2), reward_model(2)
     normals = torch.randn(2, together.size)
     together.update(memory(places), normals)
     other = places.clone()
@@ -136,11 +141,11 @@ def test_learners_share_nothing() -> None:
 
 
 def test_many_ues_have_no_features_of_their_own() -> None:
-    crowd = dataclasses.replace(SCENARIO, ue_positions=disk(MANY_UES + 1, seed=0))
-    few = dataclasses.replace(SCENARIO, ue_positions=disk(MANY_UES, seed=0))
-    assert expectation(scenario=few).size > 6 * MANY_UES
-    regression = expectation(scenario=crowd)
-    assert regression.size == expectation().size - 6 * SCENARIO.num_ues
+    crowd = dataclasses.replace(SCENARIO, ue_positions=disk(MOST + 1, seed=0))
+    few = dataclasses.replace(SCENARIO, ue_positions=disk(MOST, seed=0))
+    assert reward_model(scenario=few).size > 6 * MOST
+    regression = reward_model(scenario=crowd)
+    assert regression.size == reward_model().size - 6 * SCENARIO.num_ues
     assert regression.features(torch.zeros(1, 3, 2), torch.zeros(1, 3, 1)).shape == (
         1,
         3,

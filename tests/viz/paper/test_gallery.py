@@ -14,8 +14,8 @@ from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import train
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
 from hyuav.viz.paper.gallery import FIGURES, draw

@@ -25,9 +25,11 @@ from hyuav._support.parameters import (
 from hyuav.experiments.comparison.ray import LOCAL
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.learning.algorithm import AlgorithmParameters
-from hyuav.learning.cohort import Learner
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.parameters import OFF
+from hyuav.learning.guide.robust import Robust
 from hyuav.learning.registry import ALGORITHMS, PEER, find, is_reference, names
+from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
 from hyuav.physics.offloading import MODE_RULES, ModeRuleName
@@ -39,15 +41,21 @@ ENTRIES = (*ALGORITHMS, PEER)
 PLAIN = {name: name.removesuffix("_robust") for name in ALGORITHMS}
 """The algorithm that each is a variant of."""
 
-PIECES = tuple(
-    dict.fromkeys(
+
+def _pieces(name: str) -> tuple[str, ...]:
+    """What distinguishes a variant from the algorithm that it is a variant of."""
+    own, plain = ALGORITHMS[name](), ALGORITHMS[PLAIN[name]]()
+    differing = [
         field.name
-        for name, plain in PLAIN.items()
-        for field in dataclasses.fields(ALGORITHMS[name])
-        if getattr(ALGORITHMS[name](), field.name) != getattr(ALGORITHMS[plain](), field.name)
-    )
-)
-"""Hyperparameters in which a variant differs from the algorithm that it is a variant of."""
+        for field in dataclasses.fields(plain)
+        if getattr(own, field.name) != getattr(plain, field.name)
+    ]
+    return (*differing, *(OFF if isinstance(own, Robust) else ()))
+
+
+PIECES = tuple(dict.fromkeys(piece for name in ALGORITHMS for piece in _pieces(name)))
+"""Hyperparameters in which a variant differs from the algorithm that it is a variant of, and the
+pieces of its guide."""
 
 ENGINES = ("processes", "ray")
 """What works the shards off."""
@@ -149,11 +157,12 @@ def parameters_of(entry: str) -> AlgorithmParameters:
     name, _, piece = entry.partition("-")
     if name == PEER:
         return DDPG()
-    parameters: AlgorithmParameters = ALGORITHMS[name]()
-    if not hasattr(parameters, piece):
-        return parameters
-    plain = getattr(ALGORITHMS[PLAIN.get(name, name)](), piece)
-    return type(parameters).from_dict({**parameters.to_dict(), piece: plain})
+    own, plain = ALGORITHMS[name](), ALGORITHMS[PLAIN.get(name, name)]()
+    if isinstance(own, Robust) and own.guide is not None and piece in OFF:
+        return dataclasses.replace(own, guide=own.guide.without(piece))
+    if not hasattr(plain, piece):
+        return own
+    return dataclasses.replace(own, **{piece: getattr(plain, piece)})
 
 
 def training_episodes(training: TrainingParameters) -> EvaluationParameters:

@@ -16,7 +16,7 @@ from hyuav.experiments.comparison.plan import training_episodes
 from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
 from hyuav.experiments.run_directory import RunConfiguration
 from hyuav.experiments.schemes import LEARNED
-from hyuav.learning.cohort import Learner
+from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
 
 

@@ -14,8 +14,12 @@ from hyuav._support.parameters import CountOrZero, NonNegativeNumber, checked
 from hyuav.experiments.metrics import MetricsPosition, remove_damaged_rows
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.tracking.parameters import Identifier
-from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
-from hyuav.learning.state import require_entries, require_like
+from hyuav.learning.checkpoint import (
+    load_checkpoint,
+    require_entries,
+    require_like,
+    save_checkpoint,
+)
 from hyuav.learning.training import Training
 
 Checksum = Annotated[int, Field(ge=0, le=2**32 - 1)]

@@ -1,23 +1,22 @@
-"""What of a reward is the luck of its slot's fading, learned and taken off."""
+"""What of a reward its slot's fading brought by chance, learned and taken off."""
+
+from collections.abc import Sequence
 
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
 
-from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.networks import LearnerMLP
 from hyuav.learning.replay import FADING
 from hyuav.physics.channel import LinkRow
 from hyuav.physics.scenario import Scenario
 
-HIDDEN_SIZES = (64, 64)
-
-LUCK = ("next", "luck")
+CONTROL_TERM = ("next", "control_term")
 
 
 class ControlVariate(nn.Module):
-    """Rewards without most of the luck of the fading, and with the same mean.
+    """Rewards without most of what the fading brought by chance, and with the same mean.
 
     A reward is regressed on where the helper is and, linearly, on the fading powers f of the slot,
     which have unit mean whatever the helper does: r = u(s') + w(s') (f - 1) + rest. Less w (f - 1)
@@ -29,19 +28,25 @@ class ControlVariate(nn.Module):
     Args:
         learners: N.
         scenario: whose links fade.
+        afterstate: of the scenario, whose features the network sees.
+        hidden_sizes: of the network.
         reward_scale: of the rewards that are stored, against bps/Hz.
-        clock: whether the slots flown are observed.
     """
 
     def __init__(
-        self, learners: int, scenario: Scenario, reward_scale: float, *, clock: bool
+        self,
+        learners: int,
+        scenario: Scenario,
+        afterstate: Afterstate,
+        hidden_sizes: Sequence[int],
+        reward_scale: float,
     ) -> None:
         super().__init__()
         self._scale = reward_scale
-        self.afterstate = Afterstate(scenario, clock=clock, geofence=True)
-        self.layout = ObservationLayout(scenario, clock=clock)
+        self.afterstate = afterstate
+        self.layout = afterstate.layout
         outputs = 1 + LinkRow.of(scenario).size
-        self.network = LearnerMLP(learners, self.afterstate.size, HIDDEN_SIZES, outputs, "tanh")
+        self.network = LearnerMLP(learners, self.afterstate.size, hidden_sizes, outputs, "tanh")
 
     def forward(self, place: Tensor, clock: Tensor) -> tuple[Tensor, Tensor]:
         """What is to be expected of slots (N, ..., 1), and what each power adds (N, ..., links).
@@ -59,25 +64,25 @@ class ControlVariate(nn.Module):
         return self(self.layout.position(following), self.layout.clock(following))
 
     @torch.no_grad()
-    def luck(self, batch: TensorDictBase) -> Tensor:
+    def control_term(self, batch: TensorDictBase) -> Tensor:
         """What the fading added to the rewards of a mini-batch (N, K): (N, K, 1)."""
         _, weights = self._of(batch)
-        return _luck(weights, batch)
+        return _control_term(weights, batch)
 
-    def fair(self, batch: TensorDictBase) -> TensorDictBase:
-        """A mini-batch (N, K) with its rewards less their luck, which is told beside."""
+    def adjust(self, batch: TensorDictBase) -> TensorDictBase:
+        """A mini-batch (N, K) with its rewards less the control term, which is told beside."""
         batch = batch.clone(False)
-        luck = self.luck(batch)
-        batch["next", "reward"] = batch["next", "reward"] - luck
-        batch[LUCK] = luck
+        control_term = self.control_term(batch)
+        batch["next", "reward"] = batch["next", "reward"] - control_term
+        batch[CONTROL_TERM] = control_term
         return batch
 
     def loss(self, batch: TensorDictBase) -> Tensor:
-        """Squared error (N, K) of the regression on a mini-batch as :meth:`fair` gives it."""
+        """Squared error (N, K) of the regression on a mini-batch as :meth:`adjust` gives it."""
         expected, weights = self._of(batch)
-        reward = batch["next", "reward"] + batch[LUCK]
-        return (reward - expected - _luck(weights, batch)).square().squeeze(-1)
+        reward = batch["next", "reward"] + batch[CONTROL_TERM]
+        return (reward - expected - _control_term(weights, batch)).square().squeeze(-1)
 
 
-def _luck(weights: Tensor, batch: TensorDictBase) -> Tensor:
+def _control_term(weights: Tensor, batch: TensorDictBase) -> Tensor:
     return (weights * (batch[FADING] - 1.0)).sum(dim=-1, keepdim=True)

@@ -1,83 +1,78 @@
 """The best flight so far of each learner, to be flown again and to be joined."""
 
 import torch
-from tensordict import TensorDictBase
 from torch import Tensor, nn
 
 from hyuav.envs.observation import ObservationLayout
 from hyuav.physics.scenario import Scenario
 
 
-def as_planned(tensordict: TensorDictBase, planned: Tensor) -> TensorDictBase:
-    """Take the planned actions (N, 2) in place of ``action``, where they are not NaN."""
-    tensordict["action"] = torch.where(planned.isnan(), tensordict["action"], planned)
-    return tensordict
-
-
-AHEAD = 0.005
-"""Share by which the best flight must be worth more than an actor's own to be joined everywhere."""
-
-
-class BestFlights(nn.Module):
+class Demonstrations(nn.Module):
     """The flight of each learner that earned most, or of which most is to be expected.
 
-    The helper moves as it is told, so that the same actions lead it the same way, through other
-    fading. A way that was found once by chance is thus seen often enough to be learned of before
-    it is forgotten, and luck is told from merit (Ecoffet et al., "First return, then explore",
-    Nature 590, 2021). Beside it stands the one to try next, which may be another.
+    The helper moves as it is told, so that the same actions lead it along the same trajectory,
+    through other fading. One that was found once by chance is thus seen often enough to be learned
+    of before it is forgotten, and chance is told from merit (Ecoffet et al., "First return, then
+    explore", Nature 590, 2021). Beside it stands the planned one, to fly next; it may be another.
 
     Args:
         learners: N.
         scenario: that they fly.
+        return_margin: share by which the best flight must be worth more than an actor's own for
+            the actor to be behind.
     """
 
-    reward: Tensor
+    best_return: Tensor
     """(N,), of each; minus infinity before the first."""
     actions: Tensor
     """(T, N, 2)."""
-    way: Tensor
+    trajectory: Tensor
     """(T, N, 2), where each was after each slot, in units of half the map's side."""
-    tried_actions: Tensor
-    """(T, N, 2), of the one to try."""
-    tried_way: Tensor
+    planned_actions: Tensor
+    """(T, N, 2), of the flight to try."""
+    planned_trajectory: Tensor
     """(T, N, 2), where that leads."""
-    own_way: Tensor
+    own_trajectory: Tensor
     """(T, N, 2), where the actors flew when they were last evaluated."""
     behind: Tensor
     """(N,) bool, of which learners the actor's own flight is worth clearly less than the best."""
 
-    def __init__(self, learners: int, scenario: Scenario) -> None:
+    def __init__(self, learners: int, scenario: Scenario, return_margin: float) -> None:
         super().__init__()
         shape = scenario.num_slots, learners, 2
         self._layout = ObservationLayout(scenario, clock=True)
+        self._return_margin = return_margin
         self._slots_per_unit = scenario.num_slots / 2
         self._reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
-        self.register_buffer("reward", torch.full((learners,), -torch.inf))
-        for name in ("actions", "way", "tried_actions", "tried_way", "own_way"):
+        self.register_buffer("best_return", torch.full((learners,), -torch.inf))
+        for name in (
+            *("actions", "trajectory", "planned_actions", "planned_trajectory"),
+            "own_trajectory",
+        ):
             self.register_buffer(name, torch.full(shape, torch.nan))
         self.register_buffer("behind", torch.zeros(learners, dtype=torch.bool))
 
-    def keep(self, actions: Tensor, way: Tensor, reward: Tensor) -> None:
+    def keep(self, actions: Tensor, trajectory: Tensor, earned: Tensor) -> None:
         """Keep a flight where it is better than the best before.
 
         Args:
             actions: (T, N, 2).
-            way: (T, N, 2), where they led.
-            reward: (N,), what it earned or what is to be expected of it.
+            trajectory: (T, N, 2), where they led.
+            earned: (N,), what it earned or what is to be expected of it.
         """
-        better = reward > self.reward
-        self.reward.copy_(torch.where(better, reward, self.reward))
-        for kept, new in ((self.actions, actions), (self.way, way)):
+        better = earned > self.best_return
+        self.best_return.copy_(torch.where(better, earned, self.best_return))
+        for kept, new in ((self.actions, actions), (self.trajectory, trajectory)):
             kept.copy_(torch.where(better.unsqueeze(-1), new, kept))
 
-    def try_best(self) -> None:
-        """Let the flight to try be the best one."""
-        self.try_next(self.actions, self.way)
+    def plan_best(self) -> None:
+        """Let the planned flight be the best one."""
+        self.plan(self.actions, self.trajectory)
 
-    def try_next(self, actions: Tensor, way: Tensor) -> None:
-        """Let these actions, which lead this way, be the flight to try: (T, N, 2) each."""
-        self.tried_actions.copy_(actions)
-        self.tried_way.copy_(way)
+    def plan(self, actions: Tensor, trajectory: Tensor) -> None:
+        """Let these actions, with the trajectory that they lead along, be planned: (T, N, 2)."""
+        self.planned_actions.copy_(actions)
+        self.planned_trajectory.copy_(trajectory)
 
     def compare(self, own: Tensor) -> None:
         """Find out who is behind.
@@ -85,9 +80,9 @@ class BestFlights(nn.Module):
         Args:
             own: (N,), what the actors' own flights are worth, NaN where that is not known.
         """
-        self.behind.copy_(self.reward > own + AHEAD * own.abs())
+        self.behind.copy_(self.best_return > own + self._return_margin * own.abs())
 
-    def towards(self, observation: Tensor) -> Tensor:
+    def demonstrate(self, observation: Tensor) -> Tensor:
         """Actions (N, K, 2) that join the best flights by the next slot, or as soon as possible.
 
         Before there is one, they hover.
@@ -98,6 +93,6 @@ class BestFlights(nn.Module):
         clock = self._layout.clock(observation).squeeze(-1)
         flown = ((clock + 1.0) * self._slots_per_unit).round().long()
         slot = flown.clamp(max=len(self.actions) - 1).unsqueeze(-1).expand(*flown.shape, 2)
-        position = torch.take_along_dim(self.way.transpose(0, 1), slot, dim=1)
+        position = torch.take_along_dim(self.trajectory.transpose(0, 1), slot, dim=1)
         action = (position - self._layout.position(observation)) / self._reach
         return action.clamp(-1.0, 1.0).nan_to_num(0.0)

@@ -1,75 +1,83 @@
-"""Other ways to act than the actor's, weighed beside it so that it does not stick."""
+"""Demonstrated actions, weighed beside the actor's own so that it does not stick."""
 
-from collections.abc import Callable
+from dataclasses import replace
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictParams
 from torch import Tensor
-from torchrl.objectives import LossModule
 
-from hyuav.learning.guide.demonstrations import BestFlights
-
-CLEARLY = 0.025
-"""Scaled reward by which an alternative must be worth more; where hovering just so is all that
-matters, the best actions are near, and gradients find them."""
+from hyuav.learning.algorithm import Algorithm
+from hyuav.learning.guide.demonstrations import Demonstrations
+from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.targets import raise_target
 
 
-class Alternatives:
+class Imitation:
     """To hover and, with a clock, to join the best flight.
 
     An actor climbs to the nearest summit of what its critic holds of actions. Where the best one
     lies across a valley, one of these is likely to be beyond it.
 
     Args:
-        loss: of N learners, with the networks.
-        critic: what the loss calls its critics.
-        act: maps a mini-batch (N, K) to the actors' noise-free actions (N, K, 2), with gradients.
+        algorithm: of N learners.
         flights: the best so far.
-        weight: how strongly the actor is drawn to an alternative that is worth more.
+        guide: its parameters.
         clock: whether the slots flown are observed.
     """
 
     def __init__(
         self,
-        loss: LossModule,
-        critic: str,
-        act: Callable[[TensorDictBase], Tensor],
-        flights: BestFlights,
-        weight: float,
+        algorithm: Algorithm,
+        flights: Demonstrations,
+        guide: Guide,
         *,
         clock: bool,
     ) -> None:
-        self._loss, self._critic, self._act = loss, critic, act
-        self._flights, self._weight, self._clock = flights, weight, clock
+        self._algorithm, self._loss, self._flights = algorithm, algorithm.loss, flights
+        self._weight, self._q_margin = guide.imitation_weight, guide.q_margin
+        self._clock = clock
+        several = hasattr(self._loss, "qvalue_network")
+        self._critic = "qvalue_network" if several else "value_network"  # TorchRL's names
+
+    def attach(self, discount: float) -> Algorithm:
+        """The algorithm with :meth:`missed` in its actor's loss and :meth:`worth` in its target."""
+        raise_target(self._loss, discount, self.worth)
+        steps = {step.name: step for step in self._algorithm.steps}
+        plain = steps["actor"].loss
+        steps["actor"] = replace(
+            steps["actor"], loss=lambda batch: plain(batch) + self.missed(batch)
+        )
+        return replace(self._algorithm, steps=tuple(steps.values()))
 
     def actions(self, observation: Tensor) -> Tensor:
-        """The A alternatives (N, A, K, 2) of observations (N, K, U + 5)."""
+        """The A demonstrated actions (N, A, K, 2) for observations (N, K, U + 5)."""
         hovering = observation.new_zeros(*observation.shape[:-1], 2)
         if not self._clock:
             return hovering.unsqueeze(1)
-        return torch.stack([hovering, self._flights.towards(observation)], dim=1)
+        return torch.stack([hovering, self._flights.demonstrate(observation)], dim=1)
 
     def worth(self, observation: Tensor) -> Tensor:
-        """What the target critics hold of the best alternative, less :data:`CLEARLY`: (N, K, 1)."""
+        """What the target critics hold of the best one, less the margin: (N, K, 1)."""
         critics = getattr(self._loss, f"target_{self._critic}_params")
-        return self._rate(critics, observation, self.actions(observation)).amax(dim=1) - CLEARLY
+        values = self._rate(critics, observation, self.actions(observation))
+        return values.amax(dim=1) - self._q_margin
 
     def missed(self, batch: TensorDictBase) -> Tensor:
-        """What is added to the actor's loss: (N, K), of a mini-batch.
+        """The imitation loss, which is added to the actor's: (N, K), of a mini-batch.
 
-        It is the weighed squared distance from the best alternative, 0 where none is clearly
-        better. An actor whose whole flight is behind the best one is to join that, whatever its
-        critics hold of a single action.
+        It is the weighed squared distance from the best demonstrated action, 0 where none is
+        clearly better. An actor whose whole flight is behind the best one is to join that,
+        whatever its critics hold of a single action.
         """
         observation = batch["observation"]
-        action = self._act(batch)
+        action = self._algorithm.act(batch)
         others = self.actions(observation)
         weights = getattr(self._loss, f"{self._critic}_params").data
         worth, best = self._rate(weights, observation, others).squeeze(-1).max(dim=1)
         own = self._rate(weights, observation, action.detach()).squeeze(-1)
         chosen = torch.take_along_dim(others, best[:, None, :, None], dim=1).squeeze(1)
-        better = worth > own + CLEARLY
+        better = worth > own + self._q_margin
         if self._clock:
             behind = self._flights.behind.unsqueeze(-1)
             chosen = torch.where(behind.unsqueeze(-1), others[:, 1], chosen)

@@ -1,83 +1,174 @@
-"""Which flight of each learner is its best, and which it tries next."""
+"""The guide of the robust variants: which flight of each learner is its best, and which is next."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import torch
 from tensordict import TensorDictBase
+from tensordict.nn import TensorDictSequential
 from torch import Tensor
+from torchrl.envs import TransformedEnv
 
 from hyuav._support.randomness import RowStream, standard_normal
-from hyuav.learning.guide.demonstrations import BestFlights
-from hyuav.learning.guide.proposals import Imagination
-from hyuav.learning.guide.reward_model import Expectation
+from hyuav.envs.observation import ObservationLayout
+from hyuav.learning.algorithm import (
+    Algorithm,
+    AlgorithmParameters,
+    GradientStep,
+    Guidance,
+    adam,
+)
+from hyuav.learning.guide.control_variate import ControlVariate
+from hyuav.learning.guide.demonstrations import Demonstrations
+from hyuav.learning.guide.imitation import Imitation
+from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.proposals import TrajectoryProposals
+from hyuav.learning.guide.reward_model import RewardModel
+from hyuav.learning.guide.warm_up import WarmUp
+from hyuav.learning.weights import draw_weights
 
-JUDGED_EVERY = 4
-"""Episodes after which a learner goes through all that it remembers."""
 
-
-class FlightSearch:
+class Planner(Guidance):
     """Keep the flights of which most is to be expected, among those flown and those imagined.
 
-    Args:
-        flights: of the N learners, which are kept here.
-        expectation: of the same learners.
-        imagination: where flights are imagined.
-        seeds: of the N learners' random numbers.
-    """
+    After an episode all flights are judged anew by the reward model, where there is a control
+    variate; otherwise a flight counts what it earned.
 
-    streams: dict[str, RowStream]
-    """Of random numbers: ``guesses`` (N, F) and ``variations`` (N, D, 5)."""
+    Args:
+        guide: its parameters.
+        algorithm: the hyperparameters of the algorithm that is guided.
+        env: that the N learners fly.
+        seeds: of their random numbers.
+    """
 
     def __init__(
         self,
-        flights: BestFlights,
-        expectation: Expectation,
-        imagination: Imagination | None,
+        guide: Guide,
+        algorithm: AlgorithmParameters,
+        env: TransformedEnv,
         seeds: Sequence[int],
     ) -> None:
-        self._flights, self._expectation = flights, expectation
-        self._imagination = imagination
-        shapes: dict[str, tuple[int, ...]] = {"guesses": (expectation.size,)}
-        if imagination is not None:
-            shapes["variations"] = imagination.normals
-        device = flights.reward.device
-        self.streams = {
-            name: RowStream(standard_normal, shape, seeds, name, device)
+        super().__init__()
+        self.guide, self._algorithm = guide, algorithm
+        self.plans = guide.repeat_every > 0
+        self._env, self._seeds = env, seeds
+        learners, self._scenario = len(seeds), env.base_env.scenario
+        self._layout = ObservationLayout(self._scenario, clock=algorithm.clock)
+        with env.device:
+            self.flights = Demonstrations(learners, self._scenario, guide.return_margin)
+            self.reward_model = self._make_reward_model() if guide.control_variate else None
+        if self.reward_model is not None:
+            draw_weights(self.reward_model, seeds, "control variate")
+        physics, schemes = env.base_env.physics, env.base_env.schemes
+        self._proposals = TrajectoryProposals(guide, physics, schemes)
+        self.streams = self._random_streams()
+
+    def _make_reward_model(self) -> RewardModel:
+        learners, scale = len(self._seeds), self._algorithm.reward_scale
+        variate = ControlVariate(
+            learners,
+            self._scenario,
+            self._algorithm.make_afterstate(self._scenario, geofence=True),
+            self.guide.variate_hidden_sizes,
+            scale,
+        )
+        return RewardModel(learners, variate, scale, self.guide)
+
+    def _random_streams(self) -> dict[str, RowStream]:
+        """``guesses`` (N, F) and ``variations`` (N, D, 5), as far as they are needed."""
+        shapes: dict[str, tuple[int, ...]] = {}
+        if self.reward_model is not None and self.guide.keeps_flights:
+            shapes["guesses"] = (self.reward_model.size,)
+        if self.guide.imagined_flights:
+            shapes["variations"] = self._proposals.normals
+        return {
+            name: RowStream(standard_normal, shape, self._seeds, name, self._env.device)
             for name, shape in shapes.items()
         }
 
-    def go_on(
-        self, flown: TensorDictBase, memory: TensorDictBase, episode: int, *, imagines: bool
-    ) -> None:
-        """Judge all flights anew after an episode.
+    def attach(self, algorithm: Algorithm) -> Algorithm:
+        """An algorithm for the same learners that is guided by this."""
+        guide, explorers = self.guide, [algorithm.explorer]
+        if guide.warm_up_episodes:
+            with self._env.device:
+                explorers.append(WarmUp(len(self._seeds), guide, self._scenario))
+        if guide.imitation_weight:
+            clock, discount = self._algorithm.clock, self._algorithm.discount
+            imitation = Imitation(algorithm, self.flights, guide, clock=clock)
+            algorithm = imitation.attach(discount)
+        steps = algorithm.steps
+        if self.reward_model is not None:
+            variate = self.reward_model.variate
+            optimizer = adam(variate, guide.variate_learning_rate)
+            steps = (GradientStep("control variate", variate.loss, optimizer), *steps)
+        return replace(
+            algorithm,
+            explorer=TensorDictSequential(*explorers),
+            explorer_normals=algorithm.explorer_normals + (guide.warm_up_episodes > 0),
+            steps=steps,
+            guide=self,
+        )
 
-        Args:
-            flown: (T, N), the episode's transitions.
-            memory: (n, N), all that are stored.
-            episode: which one it was, from 1.
-            imagines: whether to look for better flights than those that were flown.
+    def plan(self, episode: int) -> Tensor | None:
+        """The planned flight, in the episodes that take one."""
+        if not self.plans:
+            return None
+        planned = self.flights.planned_actions
+        return planned if self.guide.repeats(episode) else planned * torch.nan
+
+    def prepare(self, batch: TensorDictBase) -> TensorDictBase:
+        """Take off the rewards what is known to be chance."""
+        return batch if self.reward_model is None else self.reward_model.variate.adjust(batch)
+
+    def control_term(self, slot: TensorDictBase) -> Tensor:
+        """See :meth:`Guidance.control_term`."""
+        if self.reward_model is None:
+            return super().control_term(slot)
+        return self.reward_model.variate.control_term(slot)
+
+    def end_evaluation(self, positions: Tensor) -> None:
+        """Remember where the actors fly, to be judged beside the best flights."""
+        self.flights.own_trajectory.copy_(positions)
+
+    def end_episode(self, episode: int, flown: TensorDictBase, stored: TensorDictBase) -> None:
+        """Keep the flight where it is the best so far, or one that is better still; plan the next.
+
+        See :meth:`Guidance.end_episode`.
         """
-        flights, expectation = self._flights, self._expectation
-        judges = (episode + 1) % JUDGED_EVERY == 0
-        if judges:
-            expectation.update(memory, next(self.streams["guesses"]))
-        way = expectation.variate.layout.position(flown["next", "observation"])
-        flights.reward.copy_(expectation.of(flights.way)[0].nan_to_num(-torch.inf))
-        flights.keep(flown["action"], way, expectation.of(way)[0])
-        if imagines and self._imagination is not None:
+        if not self.guide.keeps_flights:
+            return
+        if self.reward_model is not None:
+            self._judge(self.reward_model, episode, flown, stored)
+            return
+        trajectory = self._layout.position(flown["next", "observation"])
+        self.flights.keep(flown["action"], trajectory, flown["next", "reward"].sum(dim=(0, 2)))
+        self.flights.plan_best()
+
+    def _judge(
+        self, model: RewardModel, episode: int, flown: TensorDictBase, stored: TensorDictBase
+    ) -> None:
+        """The same by what is to be expected of flights: those kept, flown and imagined."""
+        flights, updates = self.flights, self.guide.updates(episode)
+        if updates:
+            model.update(stored, next(self.streams["guesses"]))
+        trajectory = self._layout.position(flown["next", "observation"])
+        known = model.judge(flights.trajectory)[0].nan_to_num(-torch.inf)
+        flights.best_return.copy_(known)
+        flights.keep(flown["action"], trajectory, model.judge(trajectory)[0])
+        if self.guide.imagined_flights and episode >= self.guide.warm_up_episodes:
             normals = next(self.streams["variations"])
-            imagined = self._imagination.fly(episode, flights, normals)
-            expected, guessed = expectation.of(imagined[1])
+            imagined = self._proposals.fly(episode, flights, normals)
+            expected, guessed = model.judge(imagined[1])
             flights.keep(*_highest(imagined, expected), expected.amax(dim=1))
-            if judges:
-                flights.try_next(*_highest(imagined, guessed))
-        elif judges:
-            flights.try_best()
-        flights.compare(expectation.of(flights.own_way)[0])
+            if updates:
+                flights.plan(*_highest(imagined, guessed))
+        elif updates:
+            flights.plan_best()
+        flights.compare(model.judge(flights.own_trajectory)[0])
 
 
 def _highest(flights: tuple[Tensor, Tensor], values: Tensor) -> tuple[Tensor, Tensor]:
-    """Of flights, actions and ways (T, N, D, 2), each learner's one of the highest value (N, D)."""
+    """Of flights, actions and trajectories (T, N, D, 2), each learner's of the highest value."""
     index = values.argmax(dim=1)[None, :, None, None].expand(len(flights[0]), -1, 1, 2)
-    actions, way = (torch.take_along_dim(each, index, dim=2).squeeze(2) for each in flights)
-    return actions, way
+    actions, trajectory = (torch.take_along_dim(each, index, dim=2).squeeze(2) for each in flights)
+    return actions, trajectory

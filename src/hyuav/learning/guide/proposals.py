@@ -6,15 +6,13 @@ import torch
 from torch import Tensor
 
 from hyuav.envs.transforms import WITHIN
-from hyuav.learning.exploration import EVENLY, destinations
-from hyuav.learning.guide.demonstrations import BestFlights
+from hyuav.learning.guide.demonstrations import Demonstrations
+from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.warm_up import EVENLY, destinations
 from hyuav.physics.slot import Physics
 
-FINEST = 40.0
-"""A variation's smallest typical displacement is this part of what is flown in a slot."""
 
-
-class Imagination:
+class TrajectoryProposals:
     """Flights to places all over the map, and variations of good ones.
 
     How the helper flies is known, and what a place earns is what a learner holds after all that it
@@ -24,13 +22,14 @@ class Imagination:
     displaces some slots in a row of a flight, by metres or by as far as can be flown in a slot.
 
     Args:
-        flights: D, straight ones, and as many variations.
+        guide: its parameters: D straight flights are imagined, and as many variations.
         physics: of the scenario that is flown.
         schemes: of the N learners.
     """
 
-    def __init__(self, flights: int, physics: Physics, schemes: Sequence[str]) -> None:
-        self._physics = physics
+    def __init__(self, guide: Guide, physics: Physics, schemes: Sequence[str]) -> None:
+        flights = guide.imagined_flights
+        self._guide, self._physics = guide, physics
         self._places = torch.arange(flights, dtype=torch.float64, device=physics.device)
         limit = physics.norm_limit(schemes)
         self._norm_limit = None if limit is None else limit.unsqueeze(1)
@@ -41,12 +40,12 @@ class Imagination:
         self._half_side = scenario.map_side / 2
         self._reach = scenario.max_speed * scenario.slot_duration / self._half_side
 
-    def fly(self, episode: int, flights: BestFlights, normals: Tensor) -> tuple[Tensor, Tensor]:
+    def fly(self, episode: int, flights: Demonstrations, normals: Tensor) -> tuple[Tensor, Tensor]:
         """The flights of an episode; the first variation is the best flight itself.
 
         Args:
             episode: in which straight flights lead to other places than in those before.
-            flights: which are varied, the best and the one that was tried last.
+            flights: which are varied, the best and the one that was planned last.
             normals: (N, D, 5), standard normal.
 
         Returns:
@@ -54,35 +53,36 @@ class Imagination:
         """
         towards = torch.cat([self._straight(episode), self._variations(flights, normals)], dim=2)
         position = self._physics.nodes.helper.flatten().expand(*towards.shape[1:])
-        actions, way = [], []
+        actions, trajectory = [], []
         for target in towards:
             action = ((target - position / self._half_side) / self._reach).clamp(-1.0, 1.0)
             velocity = self._physics.velocity(action, self._norm_limit)
             position = self._physics.move(position, velocity).position
             actions.append(action)
-            way.append(position / self._half_side)
-        return torch.stack(actions), torch.stack(way)
+            trajectory.append(position / self._half_side)
+        return torch.stack(actions), torch.stack(trajectory)
 
     def _straight(self, episode: int) -> Tensor:
         """Where to fly in each slot: (T, N, D, 2)."""
         places = self._places + len(self._places) * episode
         share = torch.stack([torch.frac(places * multiple) for multiple in EVENLY], dim=-1)
-        ends = destinations(share.to(self._physics.dtype)) * WITHIN
+        spread = self._guide.destination_spread
+        ends = destinations(share.to(self._physics.dtype), spread) * WITHIN
         return ends.expand(self._physics.scenario.num_slots, self._learners, *ends.shape)
 
-    def _variations(self, flights: BestFlights, normals: Tensor) -> Tensor:
+    def _variations(self, flights: Demonstrations, normals: Tensor) -> Tensor:
         """The same of variations."""
         varied = len(self._places)
         half = varied - varied // 2
-        of_best = flights.way.unsqueeze(2).expand(-1, -1, half, -1)
-        of_tried = flights.tried_way.unsqueeze(2).expand(-1, -1, varied // 2, -1)
+        of_best = flights.trajectory.unsqueeze(2).expand(-1, -1, half, -1)
+        of_planned = flights.planned_trajectory.unsqueeze(2).expand(-1, -1, varied // 2, -1)
         begin, length, fineness = torch.special.ndtr(normals[..., :3]).unbind(dim=-1)
-        num_slots = len(flights.way)
+        num_slots = len(flights.trajectory)
         slots = torch.arange(num_slots, device=normals.device).reshape(-1, 1, 1)
         first = (num_slots * (2.0 * begin - 1.0)).floor()  # below 0: from the beginning on
         displaced = (slots >= first) & (slots <= first.clamp(min=0.0) + num_slots * length)
-        size = self._reach * FINEST**-fineness
+        size = self._reach * self._guide.displacement_range**-fineness
         size[:, 0] = 0.0
         displacement = displaced.unsqueeze(-1) * (size.unsqueeze(-1) * normals[..., 3:])
-        way = torch.cat([of_best, of_tried], dim=2) + displacement
-        return way.nan_to_num(0.0).clamp(-WITHIN, WITHIN)
+        trajectory = torch.cat([of_best, of_planned], dim=2) + displacement
+        return trajectory.nan_to_num(0.0).clamp(-WITHIN, WITHIN)

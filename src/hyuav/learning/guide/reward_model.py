@@ -4,24 +4,26 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
 
-from hyuav.learning.guide.control_variate import HIDDEN_SIZES, ControlVariate
-
-MANY_UES = 50
-"""Up to which each has features of its own; their products are summed over the whole memory."""
+from hyuav.learning.guide.control_variate import ControlVariate
+from hyuav.learning.guide.parameters import Guide
 
 POLYNOMIAL = 6
 """Terms of a square polynomial of the position."""
 
-CAUTION = 3.0
-"""By which the posterior is widened: it does not know what the features cannot show."""
 
-ROUNDING = 1e-6
-"""Of the features' mean square sum, what the noise counts at least, so that the equations can be
-solved where rewards are almost without noise."""
+def feature_count(num_ues: int, hidden_size: int, most_ue_features: int) -> int:
+    """F, of how many features rewards are regressed on.
+
+    Args:
+        num_ues: U.
+        hidden_size: of the control variate's last hidden layer.
+        most_ue_features: U up to which each UE has features of its own.
+    """
+    return hidden_size + 1 + POLYNOMIAL * num_ues * (num_ues <= most_ue_features)
 
 
-class Expectation(nn.Module):
-    """Bayesian linear regression of the fair rewards of all slots that are remembered.
+class RewardModel(nn.Module):
+    """Bayesian linear regression of the adjusted rewards of all slots that are remembered.
 
     A control variate's network follows its mini-batches, and jitters by more than good flights
     differ. So its last layer is solved anew for the whole memory, on the features that it has
@@ -39,6 +41,7 @@ class Expectation(nn.Module):
         learners: N.
         variate: of the N learners, whose weights are used and not changed.
         reward_scale: of the rewards that are stored, against bps/Hz.
+        guide: its parameters.
     """
 
     mean: Tensor
@@ -48,12 +51,14 @@ class Expectation(nn.Module):
     noise: Tensor
     """(N, 1, 1), variance of what the regression leaves unexplained, in (bps/Hz) squared."""
 
-    def __init__(self, learners: int, variate: ControlVariate, reward_scale: float) -> None:
+    def __init__(
+        self, learners: int, variate: ControlVariate, reward_scale: float, guide: Guide
+    ) -> None:
         super().__init__()
-        self.variate, self._scale = variate, reward_scale
-        num_ues = variate.afterstate.num_ues
-        self._of_each_ue = num_ues <= MANY_UES
-        self.size = HIDDEN_SIZES[-1] + 1 + POLYNOMIAL * num_ues * self._of_each_ue
+        self.variate, self._scale, self._guide = variate, reward_scale, guide
+        num_ues, most = variate.afterstate.num_ues, guide.most_ue_features
+        self._of_each_ue = num_ues <= most
+        self.size = feature_count(num_ues, guide.variate_hidden_sizes[-1], most)
         self.register_buffer("mean", torch.zeros(learners, self.size, 1))
         self.register_buffer("guess", torch.zeros(learners, self.size, 1))
         self.register_buffer("noise", torch.ones(learners, 1, 1))
@@ -87,36 +92,36 @@ class Expectation(nn.Module):
         following = memory["next", "observation"]
         layout = self.variate.layout
         features = self.features(layout.position(following), layout.clock(following))
-        luck = self.variate.luck(memory)
-        fair = (memory["next", "reward"] - luck) / self._scale
+        control_term = self.variate.control_term(memory)
+        adjusted = (memory["next", "reward"] - control_term) / self._scale
         transposed = features.transpose(1, 2)
         products = torch.bmm(transposed, features).double()
         diagonal = products.diagonal(dim1=1, dim2=2)
-        rounding = ROUNDING * diagonal.mean(dim=1).reshape(-1, 1, 1)
-        prior = self.noise.double().maximum(rounding)
+        least = self._guide.least_noise * diagonal.mean(dim=1).reshape(-1, 1, 1)
+        prior = self.noise.double().maximum(least)
         equations = products + prior * torch.eye(self.size, device=products.device)
         root, failed = torch.linalg.cholesky_ex(equations)
-        mean = torch.cholesky_solve(torch.bmm(transposed, fair).double(), root)
+        mean = torch.cholesky_solve(torch.bmm(transposed, adjusted).double(), root)
         deviation = torch.linalg.solve_triangular(
             root.transpose(1, 2), normals.double().unsqueeze(-1), upper=True
         )
-        guess = mean + CAUTION * self.noise.double().sqrt() * deviation
-        rest = (fair - torch.bmm(features, mean.float())).square().mean(dim=1, keepdim=True)
+        guess = mean + self._guide.posterior_scale * self.noise.double().sqrt() * deviation
+        rest = (adjusted - torch.bmm(features, mean.float())).square().mean(dim=1, keepdim=True)
         solved = (failed == 0).reshape(-1, 1, 1) & rest.isfinite()
         for kept, found in ((self.mean, mean), (self.guess, guess), (self.noise, rest)):
             kept.copy_(torch.where(solved, found.to(kept.dtype), kept))
 
     @torch.no_grad()
-    def of(self, way: Tensor) -> tuple[Tensor, Tensor]:
+    def judge(self, trajectory: Tensor) -> tuple[Tensor, Tensor]:
         """What is to be expected of flights and what the last guess holds: (N, ...) bps/Hz each.
 
         Args:
-            way: (T, N, ..., 2), where they lead, in units of half the map's side.
+            trajectory: (T, N, ..., 2), where they lead, in units of half the map's side.
         """
-        slots = torch.arange(1, len(way) + 1, device=way.device).to(way.dtype)
-        clock = (slots * (2.0 / len(way)) - 1.0).reshape(-1, *[1] * (way.ndim - 1))
-        clock = clock.expand(*way.shape[:-1], 1)
-        features = self.features(way.transpose(0, 1), clock.transpose(0, 1)).sum(dim=1)
+        slots = torch.arange(1, len(trajectory) + 1, device=trajectory.device).to(trajectory.dtype)
+        clock = (slots * (2.0 / len(trajectory)) - 1.0).reshape(-1, *[1] * (trajectory.ndim - 1))
+        clock = clock.expand(*trajectory.shape[:-1], 1)
+        features = self.features(trajectory.transpose(0, 1), clock.transpose(0, 1)).sum(dim=1)
         weights = torch.cat([self.mean, self.guess], dim=-1)
         flights = features.reshape(len(features), -1, self.size)
         both = torch.bmm(flights, weights).reshape(*features.shape[:-1], 2)

@@ -12,7 +12,7 @@ from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Polic
 from hyuav.experiments.policies import learned_policies, learned_policy, straight_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
-from hyuav.learning.cohort import Learner
+from hyuav.learning.train import Learner
 from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve_optimum

@@ -6,7 +6,7 @@ from tensordict import TensorDictBase
 
 from batches import TEN_UES, mini_batch
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.targets import raise_target
+from hyuav.learning.guide.targets import raise_target
 
 WORTH = 3.0
 

@@ -1,0 +1,97 @@
+"""Variants whose learners rarely stick, with one setting for any layout, scheme and horizon.
+
+What each piece is for, and how near to the optimum they come, is told in docs/results.md.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+from torchrl.envs import TransformedEnv
+
+from hyuav._support.parameters import Fraction, OneOf, PositiveNumber, parameter
+from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
+from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.planner import Planner
+from hyuav.learning.guide.reward_model import feature_count
+from hyuav.learning.memory import Need
+from hyuav.learning.replay import FADING, TransitionOptions
+from hyuav.learning.sac import SAC
+from hyuav.learning.td3 import TD3
+from hyuav.physics.channel import LinkRow
+from hyuav.physics.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Robust(AlgorithmParameters):
+    """What the variants have in common; with any algorithm it makes a variant of that."""
+
+    actor_learning_rate: Fraction = parameter(3e-4)
+    critic_learning_rate: Fraction = parameter(3e-4)
+    target_rate: Fraction = parameter(0.01, symbol="tau")
+    clock: bool = parameter(True)
+    geofence: bool = parameter(True)
+    reward_scale: PositiveNumber = parameter(0.05)
+    layer_norm: bool = parameter(True)
+    afterstate: bool = parameter(True)
+    action_scale: Annotated[float, Field(ge=1.0, le=2.0)] = parameter(1.04)
+    guide: Guide | None = parameter(Guide())
+    """What guides the learners while they train; null for nothing."""
+
+    def guided(self, algorithm: Algorithm, env: TransformedEnv, seeds: Sequence[int]) -> Algorithm:
+        """See :meth:`AlgorithmParameters.guided`."""
+        if self.guide is None:
+            return algorithm
+        return Planner(self.guide, self, env, seeds).attach(algorithm)
+
+    def least_replay(self, num_slots: int) -> int:
+        """See :meth:`AlgorithmParameters.least_replay`: a flight, to keep the best."""
+        return num_slots if self.guide is not None and self.guide.keeps_flights else 1
+
+    @property
+    def transitions(self) -> TransitionOptions:
+        """See :attr:`AlgorithmParameters.transitions`: with the fading for a control variate."""
+        beside = (FADING,) if self.guide is not None and self.guide.control_variate else ()
+        return replace(super().transitions, beside=beside)
+
+    def needed_memory(
+        self, scenario: Scenario, horizons: Sequence[int], sizes: Mapping[str, int]
+    ) -> list[Need]:
+        """See :meth:`AlgorithmParameters.needed_memory`."""
+        needs, guide = super().needed_memory(scenario, horizons, sizes), self.guide
+        if guide is None or not guide.control_variate:
+            return needs
+        hidden_size, most = guide.variate_hidden_sizes[-1], guide.most_ue_features
+        features = 3 * feature_count(scenario.num_ues, hidden_size, most)
+        stored, flights = sizes["replay_size"], guide.imagined_flights
+        remembered = len(horizons) * stored * (LinkRow.of(scenario).size + features)
+        return [
+            *needs,
+            Need("replay_size", stored, remembered),
+            Need("imagined_flights", flights, sum(horizons) * 2 * flights * features),
+        ]
+
+
+@dataclass(frozen=True)
+class RobustDDPG(Robust, DDPG):
+    """DDPG that looks for the best flight within the horizon, and does not forget a good one."""
+
+    noise_variance: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(0.16)
+    noise_decay: Fraction = parameter(0.985)
+    noise_decay_per: Annotated[str, OneOf("slot", "episode")] = parameter("episode")
+
+
+@dataclass(frozen=True)
+class RobustTD3(RobustDDPG, TD3):
+    """TD3 with the same pieces."""
+
+
+@dataclass(frozen=True)
+class RobustSAC(Robust, SAC):
+    """SAC with the same pieces; its noise-free actor is scaled, what it explores with is not."""
+
+    temperature_init: Annotated[float, Field(ge=1e-6, le=1e6)] = parameter(0.01)
+    target_entropy: Annotated[float, Field(ge=-100.0, le=100.0)] = parameter(-4.0)
