@@ -31,9 +31,7 @@ def both_flights(scenario: Scenario, **options: Any) -> tuple[TensorDictBase, Te
     flights, resets = [], dict[str, TensorDictBase]()
     for env in envs:
         state, slots = (
-            env.reset(
-                env.fake_tensordict().select("position").set_("position", start.unsqueeze(-2))
-            ),
+            env.reset(env.fake_tensordict().select("position").set_("position", start)),
             [],
         )
         for action in actions:

@@ -99,8 +99,8 @@ class SecureOffloadingEnv(EnvBase):
         self.schemes = as_schemes(scheme, self.batch_size)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
-        flags = ModeRule.of(self.schemes, self.device)
-        self._mode_rule = ModeRule(*(self._per_row(flag) for flag in flags))
+        rules = ModeRule.of(self.schemes, self.device)
+        self._mode_rule = ModeRule(*(self._per_row(torch.as_tensor(flags)) for flags in rules))
         norm_limit = self.physics.norm_limit(self.schemes)
         self._norm_limit = None
         if norm_limit is not None:
@@ -180,7 +180,7 @@ class SecureOffloadingEnv(EnvBase):
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
         position = self.start(tensordict)
         # What is found at the start is what a slot brings in which the helpers stay there.
-        after_reset, _, _ = self._slot(position, torch.zeros_like(position))
+        after_reset = self._slot(position, torch.zeros_like(position))[0]
         if self.diagnostics:
             after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
         return after_reset

@@ -145,9 +145,9 @@ class Physics:
             ues.unsqueeze(-2), nodes.eavesdropper.unsqueeze(-3)
         )
         covered = offloading.covered_by_legitimate(to_legitimate, scenario.coverage_radius)
-        positions = ues, legitimate, nodes.eavesdropper
-        leading = torch.broadcast_shapes(*(each.shape[:-2] for each in positions))
-        positions = [each.expand(*leading, *each.shape[-2:]) for each in positions]
+        groups = ues, legitimate, nodes.eavesdropper
+        leading = torch.broadcast_shapes(*(group.shape[:-2] for group in groups))
+        positions = [group.expand(*leading, *group.shape[-2:]) for group in groups]
         return StandingNodes(
             torch.cat(positions, dim=-2).unsqueeze(-3),
             to_legitimate,
