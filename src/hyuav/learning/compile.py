@@ -53,7 +53,7 @@ class CompiledSlots:
         transitions: what is kept of each slot.
         replay: whose slots are changed.
         stored: those, (capacity, N).
-        carrier: what the helpers observe, (N,); an example.
+        observed: what the helpers observe, (N,); an example.
 
     Raises:
         Exception: one of :data:`hyuav._support.recording.COMPILATION_ERRORS`.
@@ -66,11 +66,11 @@ class CompiledSlots:
         transitions: TransitionOptions,
         replay: ReplayBuffer,
         stored: TensorDictBase,
-        carrier: TensorDictBase,
+        observed: TensorDictBase,
     ) -> None:
         self._env, self._algorithm = env, algorithm
         self._transitions, self._replay, self._stored = transitions, replay, stored
-        self._carrier = carrier.clone()
+        self._observed = observed.clone()
         self._adam = {step.name: AdamState(step) for step in algorithm.steps}
         weights = dict(algorithm.loss.named_parameters())
         self._targets = [
@@ -95,7 +95,7 @@ class CompiledSlots:
 
     def fly(
         self,
-        carrier: TensorDictBase,
+        observed: TensorDictBase,
         streams: Mapping[str, RowStream],
         plan: Tensor | None,
         slots: int,
@@ -104,7 +104,7 @@ class CompiledSlots:
         """Fly and learn for some slots.
 
         Args:
-            carrier: what the helpers observe before the first slot, (N,); left as it is.
+            observed: what the helpers observe before the first slot, (N,); left as it is.
             streams: of random numbers: ``exploration`` (N, n, 2), standard normal, where the
                 explorer draws n times; ``sampling`` (N, K), uniform; ``losses`` (N, n, K, 2),
                 standard normal, where the losses draw n times. The environment has its own.
@@ -112,7 +112,7 @@ class CompiledSlots:
             slots: how many.
             updates: taken before.
         """
-        self._begin(carrier)
+        self._begin(observed)
         counts = dict.fromkeys(self._adam, 0)
         draws = self._draws(streams, slots)
         blocks = {**draws, "corrections": self._corrections(updates, slots)}
@@ -139,8 +139,8 @@ class CompiledSlots:
             blocks["tasks"] = env.draws.take_tasks(slots).contiguous()
         return blocks
 
-    def _begin(self, carrier: TensorDictBase) -> None:
-        self._carrier.update_(carrier)
+    def _begin(self, observed: TensorDictBase) -> None:
+        self._observed.update_(observed)
         self._cursor.fill_(cursor_of(self._replay))
         self._length.fill_(len(self._replay))
         for total in (*self._totals.values(), self._finite):
@@ -203,7 +203,7 @@ class CompiledSlots:
         env.base_env.draws = GivenDraws(given.get("fading"), tasks)
         try:
             with given_normals(iter(given["exploration"].unbind(dim=1))):
-                action = self._algorithm.explorer(self._carrier.clone(False))
+                action = self._algorithm.explorer(self._observed.clone(False))
             return env.step(as_planned(action, given["plan"]) if "plan" in given else action)
         finally:
             env.base_env.draws = draws
@@ -211,7 +211,7 @@ class CompiledSlots:
     def _observe(self, flown: TensorDictBase) -> None:
         """What was the next observation is now the present one."""
         following = self._env.step_mdp(flown)
-        for name, values in self._carrier.items():
+        for name, values in self._observed.items():
             values.copy_(following[name])
 
     def _store(self, transition: TensorDictBase) -> None:

@@ -150,7 +150,7 @@ class Cohort:
         return flown
 
     def _fly_slots(self) -> FlownEpisode:
-        """Lines 2 to 17, slot by slot."""
+        """Lines 2 to 16, slot by slot."""
         reward = torch.zeros(len(self.learners), device=self.env.device)
         unbroken = torch.ones_like(self.stopped, dtype=torch.bool)
         finite = torch.zeros_like(self.stopped)

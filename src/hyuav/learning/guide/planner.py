@@ -90,8 +90,7 @@ class Planner(Guidance):
         """An algorithm for the same learners that is guided by this."""
         guide, explorers = self.guide, [algorithm.explorer]
         if guide.warm_up_episodes:
-            with self._env.device:
-                explorers.append(WarmUp(len(self._seeds), guide, self._scenario))
+            explorers.append(WarmUp(len(self._seeds), guide, self._scenario))
         if guide.imitation_weight:
             clock, discount = self._algorithm.clock, self._algorithm.discount
             imitation = Imitation(algorithm, self.flights, guide, clock=clock)
