@@ -9,12 +9,12 @@ import time
 import torch
 from torch import Tensor
 
-from hyuav import DDPG, Learner, RobustDDPG, Scenario, Training, TrainingParameters, make_env
+from hyuav import DDPG, Guide, Learner, RobustDDPG, Scenario, Training, TrainingParameters, make_env
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.sac import SAC
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
-SHORT = RobustDDPG(warm_up_episodes=5)
+SHORT = RobustDDPG(guide=Guide(warm_up_episodes=5))
 
 
 def train(

@@ -76,7 +76,7 @@ def table(parameters: type[Parameters], defaults: dict[str, Any] | None = None) 
         parameters: the record.
         defaults: where they differ from the record's own.
     """
-    rows = [("name", "default", "accepted", "unit", "symbol", "meaning")]
+    rows: list[tuple[str, ...]] = [("name", "default", "accepted", "unit", "symbol", "meaning")]
     rows += _rows(parameters, defaults)
     filled = [column for column in zip(*rows, strict=True) if any(column[1:])]
     lines = [" | ".join(row).join(("| ", " |")) for row in zip(*filled, strict=True)]
@@ -100,7 +100,7 @@ def _rows(
             _symbol(field.metadata["symbol"]),
             documented.get(field.name, ""),
         )
-        if inner:
+        if isinstance(own, Parameters):
             yield from _rows(type(own), None, f"{owner}{field.name}.")
 
 

@@ -28,8 +28,8 @@ SHORT = dataclasses.replace(SCENARIO, num_slots=3)
 CORNER_TO_CORNER = dataclasses.replace(
     SCENARIO,
     map_side=150.1,
-    helper_starts=(75.05, -75.05),
-    eavesdropper_positions=(-75.05, 75.05),
+    helper_starts=((75.05, -75.05),),
+    eavesdropper_positions=((-75.05, 75.05),),
 )
 """The eavesdropper is as far away as can be, and float32 rounds the distance up."""
 

@@ -44,7 +44,7 @@ def test_the_observation_is_of_order_one_in_the_corners_of_the_map(
     # Every node in the opposite corner: no distance on the map is longer.
     opposite = (-corner[0], -corner[1])
     scenario = Scenario(
-        ue_positions=(opposite,), legitimate_position=opposite, eavesdropper_positions=opposite
+        ue_positions=(opposite,), legitimate_position=opposite, eavesdropper_positions=(opposite,)
     )
     observation = start_at(make_env(scenario), corner)["observation"]
     assert observation[3:].tolist() == pytest.approx([2 * 2**0.5 - 1] * 3)

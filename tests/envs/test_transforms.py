@@ -254,7 +254,7 @@ def test_bad_arguments_are_answered_in_one_line(arguments: dict[str, Any], field
 def test_the_fading_that_is_told_is_what_the_slot_was_earned_by(
     batch_size: tuple[int, ...], fading: bool
 ) -> None:
-    scenario = dataclasses.replace(TWO_CLUSTERS, fading=fading, helper_starts=(-40.0, 0.0))
+    scenario = dataclasses.replace(TWO_CLUSTERS, fading=fading, helper_starts=((-40.0, 0.0),))
     env = make_env(scenario, "relay", batch_size, seed=0, fading=True)
     check_env_specs(env)
     silent = make_env(scenario, "relay", batch_size, seed=0)
@@ -262,8 +262,8 @@ def test_the_fading_that_is_told_is_what_the_slot_was_earned_by(
     assert found["fading"].shape == (*batch_size, 5, 3 * scenario.num_ues + 2)
     physics = env.base_env.physics
     nodes = physics.nodes._replace(helper=found["position"])
-    fading = physics.link_row.unflatten(found["fading"])
-    rates = slot(physics, nodes, Control(torch.zeros(1, 2)), fading).relay.sum_rate
+    powers = physics.link_row.unflatten(found["fading"])
+    rates = slot(physics, nodes, Control(torch.zeros(1, 2)), powers).relay.sum_rate
     torch.testing.assert_close(found["reward"].squeeze(-1), rates - 0.2 * found["off_map"][..., 0])
     assert bool((found["fading"] == 1.0).all()) != fading
     assert "fading" not in silent.reset()

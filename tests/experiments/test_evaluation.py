@@ -71,7 +71,7 @@ def test_a_fixed_mode_scheme_is_measured_against_its_own_optimum_and_the_hybrid_
 
 def test_all_schemes_fly_through_the_same_fading() -> None:
     everywhere = SCENARIO.helper_starts[0]
-    still = dataclasses.replace(SCENARIO, eavesdropper_positions=everywhere)
+    still = dataclasses.replace(SCENARIO, eavesdropper_positions=(everywhere,))
     hovering = Policy(ja_lt(still))
     few = EvaluationParameters(episodes=5, flights=5, seed=3)
     twice = [fly(still, scheme, hovering, few).slots for scheme in ("ja_lt", "optimum")]
@@ -113,7 +113,7 @@ def test_the_totals_are_sums_over_the_slots_of_an_episode() -> None:
 
 
 def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> None:
-    leaving = dataclasses.replace(SCENARIO, eavesdropper_positions=(-100.0, -100.0))
+    leaving = dataclasses.replace(SCENARIO, eavesdropper_positions=((-100.0, -100.0),))
     policy = Policy(ja_lt(dataclasses.replace(leaving, num_slots=3)))
     flown = fly(leaving, "ja_lt", policy, EvaluationParameters(episodes=4, flights=4)).slots
     assert flown["off_map"].any()

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from hyuav import Scenario
+from hyuav import RobustDDPG, Scenario
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import Reported, save_checkpoints
 from hyuav.learning.checkpoint import load_checkpoint
@@ -74,7 +74,10 @@ def stage(directory: Path) -> str:
     episodes = run.configuration().training.num_episodes
     if first["episode"] == 0:
         return "before the first later checkpoint"
-    if first["episode"] <= run.configuration().algorithm.guide.warm_up_episodes:
+    algorithm = run.configuration().algorithm
+    assert isinstance(algorithm, RobustDDPG)
+    assert algorithm.guide is not None
+    if first["episode"] <= algorithm.guide.warm_up_episodes:
         return "in the warm-up"
     return "after the last episode" if first["episode"] == episodes else "later"
 

@@ -93,8 +93,9 @@ def test_a_hostile_configuration_is_kept_as_it_is_or_refused(tmp_path: Path) -> 
 
 
 RECORDS: list[type[Parameters]] = [
+    *ALGORITHMS.values(),
     *(Benchmark, Compare, Dashboard, EvaluationParameters, TrainingParameters),
-    *(LoggerParameters, EvaluationLoggerParameters, Learner, *ALGORITHMS.values()),
+    *(LoggerParameters, EvaluationLoggerParameters, Learner),
 ]
 
 

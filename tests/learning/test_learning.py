@@ -8,13 +8,14 @@ from scipy import stats
 
 from hyuav import Scenario
 from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.robust import Robust
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.references.optimum import solve_optimum
 
 EASY = dataclasses.replace(
-    Scenario.preset("two_clusters"), helper_starts=(20.0, 20.0), num_slots=10, fading=False
+    Scenario.preset("two_clusters"), helper_starts=((20.0, 20.0),), num_slots=10, fading=False
 )
 """Jamming pays within two slots of the start: a small network finds it in few episodes."""
 
@@ -27,8 +28,9 @@ def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
         hidden_sizes=(64, 64),
         actor_learning_rate=1e-3,
         critic_learning_rate=1e-3,
-        **({"guide": Guide(warm_up_episodes=20)} if robust else {}),
     )
+    if isinstance(algorithm, Robust):
+        algorithm = dataclasses.replace(algorithm, guide=Guide(warm_up_episodes=20))
     parameters = TrainingParameters(
         num_episodes=80 * (1 + robust),  # some of which are flown at random
         batch_size=64,

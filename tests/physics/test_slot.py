@@ -184,8 +184,8 @@ def test_a_layout_in_each_row_is_as_that_layout_alone(
             scenario,
             ue_positions=tuple(layout[3:]),
             legitimate_position=layout[0],
-            helper_starts=layout[1],
-            eavesdropper_positions=layout[2],
+            helper_starts=(layout[1],),
+            eavesdropper_positions=(layout[2],),
         )
         for layout in layouts
     ]

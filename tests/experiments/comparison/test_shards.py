@@ -36,7 +36,7 @@ TRAINING = TrainingParameters(
 )
 EVALUATION = EvaluationParameters(episodes=7, resolution=10.0)
 SCENARIO = Scenario(
-    ue_positions=((5.0, 6.0), (-7.0, 8.0)), helper_starts=(-20.0, -20.0), num_slots=6
+    ue_positions=((5.0, 6.0), (-7.0, 8.0)), helper_starts=((-20.0, -20.0),), num_slots=6
 )
 LEARNERS = tuple(Learner(scheme, seed) for scheme in ("relay", "hybrid") for seed in (3, 4))
 

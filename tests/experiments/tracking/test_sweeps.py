@@ -16,6 +16,7 @@ from wandb.sdk.launch.sweeps.utils import (
     load_sweep_config,
 )
 
+from hyuav._support.parameters import mapping
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.learning.registry import ALGORITHMS
 from offline_wandb import offline_runs, recorded, summary
@@ -83,7 +84,7 @@ def test_all_that_a_sweep_draws_is_accepted(file: Path) -> None:
         values = OmegaConf.create({})
         for key, value in drawn.items():
             OmegaConf.update(values, key, value)
-        (algorithm,) = OmegaConf.to_object(values).values()
+        algorithm = mapping("values", OmegaConf.to_object(values))["algorithm"]
         ALGORITHMS[name].from_dict(algorithm)
 
 

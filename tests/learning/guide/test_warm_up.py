@@ -12,7 +12,7 @@ SCENARIO = Scenario.preset("two_clusters")
 
 def fly(warm_up: WarmUp, learners: int, num_slots: int) -> torch.Tensor:
     """Where an episode of learners whose actors want to stay leads: (slots, N, 2) m."""
-    position, flight = torch.tensor(SCENARIO.helper_start).expand(learners, 2), []
+    position, flight = torch.tensor(SCENARIO.helper_starts[0]).expand(learners, 2), []
     for count in range(num_slots):
         seen = TensorDict(
             action=torch.zeros(learners, 2),
@@ -28,7 +28,7 @@ def fly(warm_up: WarmUp, learners: int, num_slots: int) -> torch.Tensor:
 def test_a_warm_up_ends_after_its_episodes() -> None:
     torch.manual_seed(0)
     warm_up = WarmUp(3, Guide(warm_up_episodes=2), SCENARIO)
-    start = torch.tensor(SCENARIO.helper_start)
+    start = torch.tensor(SCENARIO.helper_starts[0])
     assert bool((fly(warm_up, 3, 5) != start).all())
     assert bool((fly(warm_up, 3, 5) != start).all())
     assert bool((fly(warm_up, 3, 5) == start).all())

@@ -16,7 +16,7 @@ from hyuav.viz.data.schemes import scheme_color
 
 
 def test_moving_the_eavesdropper_changes_the_map() -> None:
-    moved = dataclasses.replace(SCENARIO, eavesdropper_positions=(-50.0, 30.0))
+    moved = dataclasses.replace(SCENARIO, eavesdropper_positions=((-50.0, 30.0),))
     before, after = (explorer_map(scenario, "hybrid", "rate") for scenario in (SCENARIO, moved))
     assert not np.array_equal(before.data[0].z, after.data[0].z)
 
