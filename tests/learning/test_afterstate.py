@@ -43,7 +43,7 @@ def test_it_is_what_the_environment_brings(
     )
     covered, beside = features[:, num_ues + 4 : -1 - clock], features[:, 2 * num_ues + 4]
     apart = (after["distances"][:, 0, :num_ues] - scenario.coverage_radius).abs() > 0.1
-    inside = after["distances"][:, :num_ues] < scenario.coverage_radius
+    inside = after["distances"][:, 0, :num_ues] < scenario.coverage_radius
     assert torch.equal(covered[apart] > 0.0, inside[apart])
     assert bool(beside > 0.0) == bool(after["off_map"])
     if clock:

@@ -54,7 +54,7 @@ def diagnose(
         edge_load: (..., 1) cycles that the edge server took in the previous slot.
     """
     cpu_cycles, offloading = tasks.cpu_cycles, slot.offloading
-    duration, num_ues = scenario.slot_duration, scenario.num_ues
+    duration, num_ues, power = scenario.slot_duration, scenario.num_ues, slot.control.power
     sending = torch.where(
         slot.relays,
         energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=True),
@@ -65,11 +65,11 @@ def diagnose(
     edge_energy = energy.computation_energy(edge_load / duration, scenario.capacitance, duration)
     transmitting = torch.where(
         slot.relays,
-        energy.relay_energy(offloading, scenario.relay_power, duration).unsqueeze(-1),
-        energy.jamming_energy(scenario.jamming_power, duration),
+        energy.relay_energy(offloading, scenario.relay_power * power, duration),
+        energy.jamming_energy(scenario.jamming_power * power, duration),
     )
     flying = energy.flight_energy(slot.control.velocity, scenario.helper_mass, duration)
-    helper_energy = flying + transmitting * slot.control.power
+    helper_energy = flying + transmitting
     violations = (
         (ue_energy > _rounded_up(scenario.ue_energy_budget)).sum(dim=-1, keepdim=True)
         + (edge_energy > _rounded_up(scenario.edge_energy_budget))

@@ -19,22 +19,22 @@ def offloading_energy(ue_power: float, slot_duration: float, num_ues: int, *, re
     return ue_power * slot_duration / ((2 if relay else 1) * num_ues)
 
 
-def relay_energy(offloading: Tensor, relay_power: float, slot_duration: float) -> Tensor:
+def relay_energy(offloading: Tensor, relay_power: Tensor | float, slot_duration: float) -> Tensor:
     """Transmission energy in relay mode, sum_u z_u p_R Delta / (2 U) in J.
 
     Args:
         offloading: (..., U) bool, z_u.
-        relay_power: p_R in W.
+        relay_power: p_R in W, (..., H) or of all.
         slot_duration: Delta in s.
 
     Returns:
-        (...) J.
+        (..., H) J.
     """
     num_ues = offloading.shape[-1]
-    return offloading.sum(dim=-1) * (relay_power * slot_duration / (2 * num_ues))
+    return offloading.sum(dim=-1, keepdim=True) * (relay_power * slot_duration / (2 * num_ues))
 
 
-def jamming_energy(jamming_power: float, slot_duration: float) -> float:
+def jamming_energy(jamming_power: Tensor | float, slot_duration: float) -> Tensor | float:
     """Transmission energy in jamming mode, p_J Delta in J: the helper jams through the slot."""
     return jamming_power * slot_duration
 
@@ -82,7 +82,7 @@ def budget_speed(scenario: Scenario, mode_rule: str) -> float:
     relaying for every UE.
     """
     relaying = scenario.relay_power * scenario.slot_duration / 2
-    jamming = jamming_energy(scenario.jamming_power, scenario.slot_duration)
+    jamming = float(jamming_energy(scenario.jamming_power, scenario.slot_duration))
     transmission = {"relay": relaying, "jamming": jamming, "hybrid": max(relaying, jamming)}
     return speed_within_budget(
         scenario.helper_energy_budget - transmission[mode_rule],

@@ -97,9 +97,8 @@ def optimum(scenario: Scenario, rule: str, *, fine: bool) -> Optimum:
     """
     spacing = resolution(scenario, fine=fine)
     draws = FINE_DRAWS if fine else COARSE_DRAWS
-    return solve_optimum(scenario, [rule], resolution=spacing, draws=draws, evaluation_draws=2000)[
-        rule
-    ]
+    found = solve_optimum(scenario, [rule], resolution=spacing, draws=draws, evaluation_draws=2000)
+    return found[rule]
 
 
 @lru_cache(maxsize=128)
