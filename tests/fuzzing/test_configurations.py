@@ -3,7 +3,6 @@
 import importlib
 import io
 import sys
-from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -36,8 +35,7 @@ from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.viz.dashboard.serve import Dashboard
-
-Call = Callable[..., None]
+from recipe_calls import Call, Refusal
 
 WHOLE = RunConfiguration(
     "custom",
@@ -253,3 +251,29 @@ def test_a_scenario_that_holds_values_alone_is_read(
     with pytest.raises(SystemExit):
         call("train", f"--config-dir={tmp_path / 'sent'}", "scenario=own", "logger.mode=disabled")
     assert "num_slots = 0: expected a whole number >= 1" in capsys.readouterr().err
+
+
+def test_a_file_that_is_not_chosen_may_be_whatever_it_is(refusal: Refusal, tmp_path: Path) -> None:
+    (tmp_path / "sent" / "scenario" / "far").mkdir(parents=True)
+    (tmp_path / "sent" / "scenario" / "evil.yaml").write_text("hydra: {run: {dir: hacked}}\n")
+    (tmp_path / "sent" / "scenario" / "far" / "own.yaml").write_text("ue_positions: 3\n")
+    line = refusal("train", "-cd", f"{tmp_path / 'sent'}", "scenario=far/own")
+    assert line.startswith("error: ue_positions = 3: expected at least one pair")
+    line = refusal("train", f"--config-dir={tmp_path / 'sent'}", "scenario=glob(*)", "-m")
+    assert line.startswith("error: configuration file ")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--config-dir", "missing"],
+        ["--config-path", "sent"],
+        ["--config-p=sent"],
+        ["hydra.searchpath=[file://sent]"],
+        ["++hydra.searchpath=[file://sent]"],
+        ["--config-dir"],
+        ["--cfg", "all of it"],
+    ],
+)
+def test_files_are_read_from_one_place_alone(refusal: Refusal, words: list[str]) -> None:
+    assert refusal("train", *words).startswith("error: ")

@@ -1,6 +1,5 @@
 """Hydra for the recipes: typed defaults by name, and one line for every mistake."""
 
-import argparse
 import contextlib
 import dataclasses
 import logging
@@ -14,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
-from unittest import mock
 
 import hydra
 from hydra.core.config_store import ConfigStore
@@ -59,14 +57,15 @@ def register(groups: Iterable[str]) -> None:
         groups: that are wanted. Where one is not, its name is free for a plain entry.
     """
     store = ConfigStore.instance()
-    for name in PRESETS:
-        node = {"name": name, **Scenario.preset(name).to_dict()}
-        store.store(group="scenario", name=name, node=node)
-    for name, algorithm in ALGORITHMS.items():
-        node = {"name": name, **algorithm().to_dict()}
-        store.store(group="algorithm", name=file_name(name), node=node)
-    for group in {"scenario", "algorithm"}.difference(groups):
-        del store.repo[group]
+    members: dict[str, dict[str, tuple[str, Parameters]]] = {
+        "scenario": {name: (name, Scenario.preset(name)) for name in PRESETS},
+        "algorithm": {file_name(name): (name, kind()) for name, kind in ALGORITHMS.items()},
+    }
+    for group, known in members.items():
+        store.repo.pop(group, None)  # with the files of an earlier call
+        for member, (name, parameters) in known.items() if group in groups else ():
+            node = {"name": name, **parameters.to_dict()}
+            store.store(group=group, name=member, node=node)
 
 
 def recipe(
@@ -122,7 +121,6 @@ def recipe(
         def command() -> None:
             nonlocal composed, references
             composed = False
-            read_files_as_data()
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
             register(groups)
@@ -136,6 +134,7 @@ def recipe(
                 references = run_named(chosen="algorithm" in groups)
                 register(groups)
                 _refuse_overrides(node, groups)
+                read_files_as_data(groups)
                 hydra.main(version_base=None, config_path=None, config_name=name)(run)()
 
         return command
@@ -180,8 +179,7 @@ def _ending_in_one_line(composed: Callable[[], bool]) -> Iterator[None]:
             refusals is a fault of the program, to be seen whole.
     """
     try:
-        with mock.patch.object(argparse.ArgumentParser, "print_usage"):
-            yield
+        yield
     except RecursionError:
         if composed():
             raise

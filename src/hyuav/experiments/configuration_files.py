@@ -1,13 +1,13 @@
-"""Configuration files for Hydra that are data: nothing in them is run, looked up or obeyed."""
+"""Files of ``--config-dir`` for Hydra as data: nothing in them is run, looked up or obeyed."""
 
-from collections.abc import Iterator
+import argparse
+import re
+import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-from hydra._internal.core_plugins import file_config_source
-from hydra._internal.sources_registry import SourcesRegistry
-from hydra.core.plugins import Plugins
-from hydra.plugins.config_source import ConfigResult
+from hydra.core.config_store import ConfigStore
 
 from hyuav._support.errors import InputError, brief, rejection
 from hyuav._support.yaml_files import read_yaml
@@ -15,48 +15,101 @@ from hyuav._support.yaml_files import read_yaml
 ORDERS = ("defaults", "hydra", "_target_")
 """Names under which Hydra takes orders: what else to read, where to write, what to call."""
 
+FLAGS = ("help", "hydra-help", "version", "resolve", "run", "multirun")
 
-def read_files_as_data() -> None:
-    """From now on Hydra reads files, as those of ``--config-dir``, by :class:`FileConfigSource`.
+SHORT = {
+    "help": "-h",
+    "run": "-r",
+    "multirun": "-m",
+    "cfg": "-c",
+    "package": "-p",
+    "info": "-i",
+    "config-path": "-cp",
+    "config-name": "-cn",
+    "config-dir": "-cd",
+}
 
-    So do the workers of its launchers, to which Hydra hands over what is registered.
-    """
-    Plugins.instance()  # which registers Hydra's own way when it is made
-    SourcesRegistry.instance().types[FileConfigSource.scheme()] = FileConfigSource
+
+class _Options(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """Answer in one line, without the usage that Hydra would print first."""
+        raise InputError(message)
 
 
-class FileConfigSource(file_config_source.FileConfigSource):
-    """Files that hold names with plain values, as :meth:`.Parameters.save` writes.
-
-    It bears the name of Hydra's own, which a worker would otherwise not find in its place.
+def read_files_as_data(groups: Iterable[str]) -> None:
+    """Put the files that the command line chooses into Hydra's store, and let it see no directory.
 
     Hydra would let a file call any function (``hydra.callbacks``), write anywhere
     (``hydra.run.dir``) and copy the environment (``${oc.env:...}``), which is not to be expected of
     a scenario that somebody sent.
+
+    Args:
+        groups: whose members may be files, ``DIR/GROUP/NAME.yaml``.
+
+    Raises:
+        InputError: no such directory, a chosen file that cannot be read or holds more than plain
+            values, or an option that Hydra does not know.
     """
+    options, overrides = _parser().parse_known_args(sys.argv[1:])
+    given = {name.replace("_", "-"): value for name, value in vars(options).items()}
+    if unknown := [each for each in overrides if each.startswith("-")]:
+        raise InputError(f"unrecognized arguments: {' '.join(unknown)}")
+    searched = any(each.lstrip("+~").startswith("hydra.searchpath") for each in overrides)
+    if searched or given["config-path"]:
+        raise InputError("files are read from --config-dir DIR alone")
+    directory = given.pop("config-dir")
+    if directory is not None:
+        for group in groups:
+            _store_members(Path(directory), group, overrides)
+    flags = [f"--{name}" for name in FLAGS if given.pop(name)]
+    values = [f"--{name}={value}" for name, value in given.items() if value is not None]
+    sys.argv[1:] = [*overrides, *flags, *values]
 
-    def load_config(self, config_path: str) -> ConfigResult:
-        """Read a file.
 
-        Raises:
-            InputError: it cannot be read, or there is more than plain values in it.
-        """
-        path = Path(self.path) / self._normalize_file_name(config_path)
+def _parser() -> argparse.ArgumentParser:
+    """Of the options that Hydra has."""
+    parser = _Options(add_help=False)
+    for name in FLAGS:
+        parser.add_argument(f"--{name}", *filter(None, [SHORT.get(name)]), action="store_true")
+    parser.add_argument("--cfg", "-c", choices=["job", "hydra", "all"])
+    topics = ["all", "config", "defaults", "defaults-tree", "plugins", "searchpath"]
+    parser.add_argument("--info", "-i", nargs="?", const="all", choices=topics)
+    for name in ("package", "config-path", "config-name", "config-dir", "experimental-rerun"):
+        parser.add_argument(f"--{name}", *filter(None, [SHORT.get(name)]))
+    return parser
+
+
+def _store_members(directory: Path, group: str, overrides: Iterable[str]) -> None:
+    """Offer the files of a group; one that is not chosen may be whatever it is."""
+    if not directory.is_dir():
+        raise InputError(rejection("--config-dir", str(directory), "a directory"))
+    values = [
+        each.partition("=")[2] for each in overrides if each.lstrip("+").startswith(f"{group}=")
+    ]
+    chosen = {word for value in values for word in re.split(r"[\s,\[\]'\"()]+", value)}
+    for path in sorted((directory / group).rglob("*.yaml")):
+        place = path.relative_to(directory / group).with_suffix("")
         try:
-            values = read_yaml(path)
-        except InputError as error:
-            raise InputError(f"configuration file {brief(str(path))}: {error}") from None
-        result = super().load_config(config_path)
-        if result.header.get("package") is not None:
-            raise _refusal(path, "@package")
-        for text in _texts(values):
-            if text in ORDERS or "${" in text:
-                raise _refusal(path, text)
-        return result
+            node = _read(path)
+        except InputError:
+            if chosen & {str(place), f"{place}.yaml", "glob"}:
+                raise
+            continue
+        within = "/".join([group, *place.parts[:-1]])
+        ConfigStore.instance().store(group=within, name=place.name, node=node, package=group)
 
 
-def _refusal(path: Path, text: str) -> InputError:
-    return InputError(rejection("configuration file", str(path), f"no {brief(text)} in it"))
+def _read(path: Path) -> dict[str, Any]:
+    """Names with plain values, as :meth:`.Parameters.save` writes them."""
+    try:
+        values = read_yaml(path)
+    except InputError as error:
+        raise InputError(f"configuration file {brief(str(path))}: {error}") from None
+    for text in _texts(values):
+        if text in ORDERS or "${" in text:
+            accepted = f"no {brief(text)} in it"
+            raise InputError(rejection("configuration file", str(path), accepted))
+    return values
 
 
 def _texts(value: Any) -> Iterator[str]:
