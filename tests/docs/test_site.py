@@ -70,7 +70,7 @@ def test_parameters_show_their_defaults(site: Path) -> None:
         "</code></pre>"
     )[0]
     text = re.sub(r"<[^>]+>", "", signature)
-    assert "num_slots: int = 20" in text
+    assert "num_slots: Slots = 20" in text
     assert "parameter(" not in text
 
 
