@@ -7,8 +7,6 @@ import torch
 from scipy import stats
 
 from hyuav import Scenario
-from hyuav.learning.guide.parameters import Guide
-from hyuav.learning.guide.robust import Robust
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
@@ -24,13 +22,9 @@ EASY = dataclasses.replace(
 def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
     torch.set_num_threads(1)
     robust = name.endswith("robust")
-    algorithm = ALGORITHMS[name](
-        hidden_sizes=(64, 64),
-        actor_learning_rate=1e-3,
-        critic_learning_rate=1e-3,
-    )
-    if isinstance(algorithm, Robust):
-        algorithm = dataclasses.replace(algorithm, guide=Guide(warm_up_episodes=20))
+    rates = {"actor_learning_rate": 1e-3, "critic_learning_rate": 1e-3}
+    guided = {"guide": {"warm_up_episodes": 20}} if robust else {}
+    algorithm = ALGORITHMS[name].from_dict({"hidden_sizes": [64, 64], **rates, **guided})
     parameters = TrainingParameters(
         num_episodes=80 * (1 + robust),  # some of which are flown at random
         batch_size=64,
