@@ -110,7 +110,7 @@ class JointView(Transform):
         """Give the action that the environment takes the helper's axis."""
         action = tensordict["action"]
         require_shape("action", action, (*tensordict.batch_size, self.layout.action_size))
-        tensordict["action"] = action.unflatten(-1, (self.layout.num_helpers, 2))
+        tensordict["action"] = torch.unflatten(action, -1, (self.layout.num_helpers, 2))
         return tensordict
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:

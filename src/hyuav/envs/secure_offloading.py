@@ -209,9 +209,9 @@ class SecureOffloadingEnv(EnvBase):
         action = action.to(torch.float32)  # as specified, whatever is given
         velocity = self.physics.velocity(action, self._norm_limit)
         after, outcome, tasks = self._slot(position, velocity)
-        after["reward"] = outcome.sum_rate
-        after["done"] = torch.zeros_like(after["reward"], dtype=torch.bool)
-        after["terminated"] = torch.zeros_like(after["reward"], dtype=torch.bool)
+        after["reward"] = reward = outcome.sum_rate
+        after["done"] = torch.zeros_like(reward, dtype=torch.bool)
+        after["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
         if self.diagnostics:
             assert tasks is not None
             edge_load = tensordict["diagnostics", "edge_load"]

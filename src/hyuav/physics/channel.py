@@ -4,6 +4,8 @@ All functions take tensors with any leading batch shape (written ``...``), in fl
 """
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Self
 
 import torch
@@ -39,7 +41,8 @@ class Links(NamedTuple):
         return Links(*(gain * power for gain, power in zip(self, fading, strict=True)))
 
 
-class LinkRow(NamedTuple):
+@dataclass(frozen=True)
+class LinkRow:
     """How the numbers of all links lie in one row: in the order of :class:`Links`.
 
     Random numbers are drawn and stored in rows (..., size).
@@ -54,16 +57,21 @@ class LinkRow(NamedTuple):
         """The row of a scenario's links."""
         return cls(scenario.num_ues, scenario.num_helpers, scenario.num_eavesdroppers)
 
-    @property
+    @cached_property
     def shapes(self) -> tuple[tuple[int, ...], ...]:
         """The shape of each entry of :class:`Links`, without leading axes."""
-        ues, helpers, eavesdroppers = self
+        ues, helpers, eavesdroppers = self.num_ues, self.num_helpers, self.num_eavesdroppers
         return (ues,), (ues, helpers), (ues, eavesdroppers), (helpers,), (helpers, eavesdroppers)
+
+    @cached_property
+    def counts(self) -> tuple[int, ...]:
+        """How many links of each kind there are."""
+        return tuple(math.prod(shape) for shape in self.shapes)
 
     @property
     def size(self) -> int:
         """How many links there are."""
-        return sum(math.prod(shape) for shape in self.shapes)
+        return sum(self.counts)
 
     def flatten(self, links: Links) -> Tensor:
         """All numbers in one row: (..., size)."""
@@ -72,11 +80,11 @@ class LinkRow(NamedTuple):
 
     def unflatten(self, row: Tensor) -> Links:
         """The numbers of a row (..., size) by link; they share its memory."""
-        parts = row.split([math.prod(shape) for shape in self.shapes], dim=-1)
+        parts = zip(row.split(self.counts, dim=-1), self.shapes, strict=True)
         return Links(
             *(
-                part if len(shape) == 1 else part.unflatten(-1, shape)
-                for part, shape in zip(parts, self.shapes, strict=True)
+                part if len(shape) == 1 else torch.unflatten(part, -1, shape)
+                for part, shape in parts
             )
         )
 
