@@ -43,7 +43,7 @@ def show(index: RunIndex) -> None:
 def _page(index: RunIndex) -> None:
     entries = index.entries()
     if not entries:
-        st.info(f"No runs in {plain(index.root)} yet: `python recipes/train.py` begins one.")
+        st.info(f"No runs in {plain(index.root)} yet: `hyuav train` begins one.")
         return
     now = time.time()
     found = _filtered(entries, now)
@@ -88,14 +88,11 @@ def _filtered(entries: Sequence[RunEntry], now: float) -> list[RunEntry]:
 
 def _several(label: str, key: str, options: set[str]) -> list[str]:
     """Some of the options, of which those chosen earlier may be gone."""
-    _keep(key, [value for value in st.session_state.get(key, []) if value in options])
+    chosen = st.session_state.setdefault(key, [])
+    kept = [value for value in chosen if value in options]
+    if kept != chosen:  # set needlessly, a choice made during this renewal would be taken back
+        st.session_state[key] = kept
     return st.multiselect(label, sorted(options), key=key)
-
-
-def _keep(key: str, values: list[str]) -> None:
-    """Set a widget only if need be, or a choice made during this renewal would be taken back."""
-    if st.session_state.get(key) != values:
-        st.session_state[key] = values
 
 
 def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from hyuav._support.errors import InputError
 from hyuav.envs.rendering import OKABE_ITO
-from hyuav.experiments.comparison.plan import ENTRIES, LAYOUT, PIECES, Compare
+from hyuav.experiments.comparison.plan import LAYOUT, PIECES, Compare
 from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.experiments.comparison.statistics import performance_profiles
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
@@ -19,11 +19,6 @@ from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.viz.data.reading import readable_config, readable_table
 
 _OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
-
-ENTRY_COLORS = {name: OKABE_ITO[_OTHERS[i % len(_OTHERS)]] for i, name in enumerate(ENTRIES)} | {
-    PEER: OKABE_ITO["vermillion"]
-}
-"""The same color for an algorithm in every figure."""
 
 _UNKNOWN = "#777777"
 """Of an algorithm or a piece that is not offered now: another user's own, an earlier version's."""
@@ -34,13 +29,12 @@ _CURVES = {"episode", "fraction"} | _IDENTITY
 
 
 def entry_color(entry: str) -> str:
-    """An entry's color; a variant without a piece has that of the piece."""
+    """An entry's color in every figure; a variant without a piece has that of the piece."""
+    if entry == PEER:
+        return OKABE_ITO["vermillion"]
     piece = entry.partition("-")[2]
-    if piece in PIECES:
-        return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]]
-    own = list(ALGORITHMS).index(entry) if entry in ALGORITHMS else None
-    known = _UNKNOWN if own is None else OKABE_ITO[_OTHERS[own % len(_OTHERS)]]
-    return _UNKNOWN if piece else ENTRY_COLORS.get(entry, known)
+    name, known = (piece, PIECES) if piece else (entry, tuple(ALGORITHMS))
+    return OKABE_ITO[_OTHERS[known.index(name) % len(_OTHERS)]] if name in known else _UNKNOWN
 
 
 def entry_line(entry: str) -> int:

@@ -54,7 +54,8 @@ def learning_figure(
     if len(horizons) <= 1:
         _add_optima(figure, curves, optima or {})
     if not curves:
-        _say(figure, "no episodes yet")
+        font, middle = {"size": 15}, {"xref": "paper", "x": 0.5, "yref": "paper", "y": 0.5}
+        figure.add_annotation(text="no episodes yet", showarrow=False, font=font, **middle)
     figure.update_layout(
         height=460,
         margin={"l": 60, "r": 15, "t": 25, "b": 110},
@@ -136,9 +137,3 @@ def _add_optima(
     if values:
         line = {"color": GREY, "width": 1.4, "dash": DASHES["dotted"]}
         figure.add_scatter(x=[None], y=[None], mode="lines", line=line, name="its optimum")
-
-
-def _say(figure: go.Figure, text: str) -> None:
-    figure.add_annotation(
-        text=text, x=0.5, y=0.5, xref="paper", yref="paper", showarrow=False, font={"size": 15}
-    )
