@@ -30,6 +30,9 @@ _ROW, _TABLE = 35, 290
 _LETTER = 6.5
 """Width in pixels of a table's letters."""
 
+_BEST, _BEGUN = "Best return (bps/Hz)", "Begun (UTC)"
+"""Columns of the list that are not shown as they are."""
+
 
 def show(index: RunIndex) -> None:
     """The page; while it follows trainings, it is renewed every few seconds."""
@@ -98,15 +101,15 @@ def _several(label: str, key: str, options: set[str]) -> list[str]:
 def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
     return pd.DataFrame(
         {
-            "run": [entry.name for entry in entries],
-            "state": [entry.state(now) for entry in entries],
-            "episode": [_episodes(entry) for entry in entries],
-            "best": [entry.best for entry in entries],
-            "scenario": [entry.scenario for entry in entries],
-            "algorithm": [entry.algorithm for entry in entries],
-            "schemes": [", ".join(entry.schemes) for entry in entries],
-            "learners": [entry.learners for entry in entries],
-            "begun": pd.to_datetime([round(entry.begun) for entry in entries], unit="s", utc=True),
+            "Run": [entry.name for entry in entries],
+            "State": [entry.state(now) for entry in entries],
+            "Episode": [_episodes(entry) for entry in entries],
+            _BEST: [entry.best for entry in entries],
+            "Scenario": [entry.scenario for entry in entries],
+            "Algorithm": [entry.algorithm for entry in entries],
+            "Mode chosen by": [", ".join(entry.schemes) for entry in entries],
+            "Learners": [entry.learners for entry in entries],
+            _BEGUN: pd.to_datetime([round(entry.begun) for entry in entries], unit="s", utc=True),
         }
     )
 
@@ -114,23 +117,15 @@ def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
 def _name_column(names: Iterable[str]) -> Any:
     """A column as wide as the longest name, since tables cut what is longer."""
     longest = max(map(len, names), default=0)
-    return st.column_config.TextColumn("Run", width=max(round(_LETTER * longest) + 18, 100))
+    return st.column_config.TextColumn(width=max(round(_LETTER * longest) + 18, 100))
 
 
 def _columns(names: Iterable[str]) -> dict[str, Any]:
     column = st.column_config
     return {
-        "run": _name_column(names),
-        "state": column.TextColumn("State"),
-        "episode": column.TextColumn("Episode"),
-        "best": column.NumberColumn(
-            "Best return (bps/Hz)", format="%.2f", help="of a learner, noise-free"
-        ),
-        "scenario": column.TextColumn("Scenario"),
-        "algorithm": column.TextColumn("Algorithm"),
-        "schemes": column.TextColumn("Mode chosen by"),
-        "learners": column.NumberColumn("Learners"),
-        "begun": column.DatetimeColumn("Begun (UTC)", format="YYYY-MM-DD HH:mm", timezone="UTC"),
+        "Run": _name_column(names),
+        _BEST: column.NumberColumn(format="%.2f", help="of a learner, noise-free"),
+        _BEGUN: column.DatetimeColumn(format="YYYY-MM-DD HH:mm", timezone="UTC"),
     }
 
 

@@ -15,7 +15,7 @@ from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html.comparison_figures import comparison_figures
 from hyuav.viz.html.document import Page, Picture, Section
 from hyuav.viz.html.player import flight_player
-from hyuav.viz.html.run import PLAYER_HEIGHT, config_section, map_section
+from hyuav.viz.html.run import config_section, map_section
 from hyuav.viz.html.tables import algorithms_table, cells_table
 
 MAX_FLIGHTS, MAX_MAPS = 8, 2
@@ -50,7 +50,7 @@ def _results(
         return
     cells = summarize_cells(results, threshold)
     for title, name, figure in comparison_figures(results, curves, cells, threshold):
-        yield Section(title, (), [Picture(name, {"": figure}, int(figure.layout.height))])
+        yield Section(title, (), [Picture(name, {"": figure})])
     algorithms = summarize_algorithms(results, threshold)
     tables = [algorithms_table(algorithms, threshold), cells_table(cells, threshold)]
     yield Section("Results", stopped(results), (), tables)
@@ -74,4 +74,4 @@ def _flights(runs: Sequence[TrainedEntry]) -> Section:
         "The best weights of each algorithm's first learner, flown for this report; of the longest "
         f"horizons, and at most {MAX_FLIGHTS}."
     )
-    return Section("Flights", notes, [Picture("Flight", figures, PLAYER_HEIGHT)])
+    return Section("Flights", notes, [Picture("Flight", figures)])

@@ -20,10 +20,13 @@ class Picture(NamedTuple):
     """Tells what is chosen among."""
     figures: Mapping[str, go.Figure]
     """By their names."""
-    height: int
-    """Of the largest in pixels, which is kept free until it is drawn."""
     small: bool = False
     """Whether several stand side by side on a wide page."""
+
+    @property
+    def height(self) -> int:
+        """Of the largest in pixels, which is kept free until it is drawn."""
+        return max(int(figure.layout.height) for figure in self.figures.values())
 
 
 class Section(NamedTuple):

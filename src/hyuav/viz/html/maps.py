@@ -14,9 +14,6 @@ from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.maps import HelperMap, Mode, helper_map
 from hyuav.viz.html.style import base_layout, square_map, translucent
 
-HEIGHT = 480
-"""Of the figure in pixels."""
-
 TITLES: dict[Mode, str] = {"relay": "Relay", "jamming": "Jamming", "better": "Better mode"}
 
 
@@ -61,7 +58,7 @@ def map_figure(scenario: Scenario, brings: HelperMap, mode: Mode) -> go.Figure:
     _add_nodes(figure, scenario)
     figure.update_layout(
         title={"text": TITLES[mode], "x": 0.5, "xanchor": "center", "font": {"size": 14}},
-        height=HEIGHT,
+        height=480,
         margin={"l": 50, "r": 15, "t": 35, "b": 125},
         showlegend=False,
         **square_map(scenario.map_side / 2),
