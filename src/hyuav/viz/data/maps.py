@@ -35,8 +35,8 @@ class HelperMap(NamedTuple):
         These are ``relay``, ``jamming``, and the ``better`` of both.
         """
         x, y = np.meshgrid(self.axis, self.axis)
-        columns = {"x": x, "y": y, **self.rates}
-        return pd.DataFrame({name: values.ravel() for name, values in columns.items()})
+        columns = [("x", x), ("y", y), *self.rates.items()]
+        return pd.DataFrame({name: values.ravel() for name, values in columns})
 
 
 def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
