@@ -142,10 +142,10 @@ def test_the_search_and_the_filters_leave_what_was_asked_for(
     write("beta", 6, schemes=("relay",))
     page = opened(_runs, tmp_path / "runs")
     page.text_input(key="search").set_value("campus").run()
-    assert page.dataframe[0].value["run"].tolist() == ["alpha"]
+    assert page.dataframe[0].value["Run"].tolist() == ["alpha"]
     page.text_input(key="search").set_value("").run()
     page.multiselect(key="schemes").set_value(["relay"]).run()
-    assert page.dataframe[0].value["run"].tolist() == ["beta"]
+    assert page.dataframe[0].value["Run"].tolist() == ["beta"]
     page.multiselect(key="states").set_value(["finished"]).run()
     assert page.dataframe[0].value.empty
     assert errors(page) == []

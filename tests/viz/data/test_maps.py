@@ -17,14 +17,14 @@ def test_rates_stand_at_the_position_of_their_row_and_column() -> None:
     scenario = dataclasses.replace(Scenario.preset("two_clusters"), fading=False)
     rates = helper_map(scenario, 1.0)
     row, column = np.searchsorted(rates.axis, (6.0, -49.0))  # y, x
-    assert rates.relay[row, column] == pytest.approx(2.391039, abs=1e-6)
-    assert rates.rates("jamming")[-21, -21] == pytest.approx(2.714112, abs=1e-6)
+    assert rates.rates["relay"][row, column] == pytest.approx(2.391039, abs=1e-6)
+    assert rates.rates["jamming"][-21, -21] == pytest.approx(2.714112, abs=1e-6)
 
 
 def test_a_full_server_is_mapped_with_mean_tasks() -> None:
     scenario = dataclasses.replace(Scenario.preset("two_clusters"), edge_energy_budget=5.0)
     free = helper_map(Scenario.preset("two_clusters"), 20.0)
-    assert helper_map(scenario, 20.0).better.sum() < free.better.sum()
+    assert helper_map(scenario, 20.0).rates["better"].sum() < free.rates["better"].sum()
 
 
 @pytest.mark.parametrize("crowded", [False, True])
@@ -39,5 +39,5 @@ def test_the_counts_are_of_the_ues_that_offload_there(crowded: bool) -> None:
         better = relay if relay.sum_rate > jamming.sum_rate else jamming
         for rule, outcome in zip(MODE_RULES, (better, relay, jamming), strict=True):
             expected = int(outcome.offloading.sum())
-            counts = helper_map(scenario, 20.0).offloading(RULE_MODES[rule])
+            counts = helper_map(scenario, 20.0).offloading[RULE_MODES[rule]]
             assert counts[at] == expected

@@ -14,7 +14,7 @@ from hyuav.experiments.comparison.statistics import (
     summarize_cells,
 )
 from hyuav.experiments.comparison.tables import MOST_COLUMNS, label
-from hyuav.viz.data.comparison import ENTRY_COLORS, entry_color, entry_line
+from hyuav.viz.data.comparison import entry_color, entry_line
 from hyuav.viz.paper.comparison import (
     cell_means,
     curves_figure,
@@ -70,11 +70,11 @@ def test_every_algorithm_is_named_in_its_color(algorithms: tuple[str, ...]) -> N
         assert legend(figure) == names
         lines = {str(line.get_label()): line for line in figure.axes[0].lines}
         colors = {name: to_hex(lines[label(name)].get_color()) for name in algorithms}
-        assert colors == {name: ENTRY_COLORS[name].lower() for name in algorithms}
+        assert colors == {name: entry_color(name).lower() for name in algorithms}
 
 
 def test_no_two_algorithms_have_the_same_color() -> None:
-    assert len(set(ENTRY_COLORS.values())) == len(ENTRIES)
+    assert len(set(map(entry_color, ENTRIES))) == len(ENTRIES)
 
 
 def test_no_two_entries_of_an_ablation_look_alike() -> None:
@@ -119,6 +119,6 @@ def test_of_many_only_the_first_is_set_beside_the_others() -> None:
 
 @pytest.mark.parametrize("entry", ["drifting", "ddpg_robust-noise_floor"])
 def test_what_is_not_offered_any_more_is_drawn_in_grey(entry: str) -> None:
-    assert entry_color(entry) not in {to_hex(known) for known in ENTRY_COLORS.values()}
+    assert entry_color(entry) not in {entry_color(known) for known in ENTRIES}
     assert entry_line(entry) == 0
     assert label(entry)

@@ -27,5 +27,5 @@ def test_the_maps_show_the_secrecy_sum_rate_in_each_mode_and_the_better() -> Non
 
 def test_the_maps_can_be_drawn_where_the_edge_server_fills_up() -> None:
     crowded = dataclasses.replace(SCENARIO, edge_energy_budget=1.0)
-    free, full = (helper_map(scenario, 20.0).better for scenario in (SCENARIO, crowded))
+    free, full = (helper_map(scenario, 20.0).rates["better"] for scenario in (SCENARIO, crowded))
     assert 0 < full.max() < free.max()

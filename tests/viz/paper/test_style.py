@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from hyuav.viz.paper import COLUMN_WIDTH, save_figure
+from hyuav.viz.paper.style import COLUMN_WIDTH, save_figure
 
 
 def test_a_figure_is_saved_for_print_at_the_width_of_a_column(tmp_path: Path) -> None:

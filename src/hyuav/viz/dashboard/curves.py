@@ -15,7 +15,6 @@ from hyuav.viz.data.curves import (
     RETURNS,
     SMOOTHING,
     LearningCurve,
-    Values,
     extremes,
     learning_curves,
     quantities,
@@ -133,7 +132,8 @@ def _traces(
             extremes(x, curve.learners[learner].to_numpy(dtype=float), MOST_POINTS)
             for learner in curve.learners.columns[:MOST_SEEDS]
         ]
-        xs, ys = (_with_gaps([part[axis] for part in parts]) for axis in (0, 1))
+        gap = np.array([[np.nan], [np.nan]])
+        xs, ys = np.hstack([line for part in parts for line in (part, gap)])
         yield go.Scatter(
             x=xs,
             y=ys,
@@ -160,8 +160,3 @@ def _traces(
 def _lines(label: str) -> str:
     """A label for the legend, on as many lines as it takes."""
     return "<br>".join(plain(line) for line in textwrap.wrap(label, LETTERS))
-
-
-def _with_gaps(parts: list[Values]) -> Values:
-    """The lines one after the other, with a gap behind each."""
-    return np.concatenate([np.append(part, np.nan) for part in parts])

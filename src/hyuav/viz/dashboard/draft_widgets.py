@@ -1,15 +1,18 @@
 """The widgets of the scenario explorer, each of which writes into the draft."""
 
-from collections.abc import Callable
 from typing import Any
 
 import streamlit as st
 
 from hyuav.viz.dashboard import draft as drafts
 from hyuav.viz.dashboard.draft import CHOICES, FIELDS, GROUPS, KINDS, Draft
+from hyuav.viz.dashboard.plain import ensure_offered
 
 _STEP = 1.0
 """Metres by which the buttons beside a coordinate move a node."""
+
+_AS_ENTERED = (bool, int, str)
+"""Kinds whose widgets give the values themselves; the others give text."""
 
 
 def editor() -> None:
@@ -33,8 +36,7 @@ def _draft() -> Draft:
 def _nodes() -> None:
     """A node's coordinates, and UEs to add and to take away."""
     options = drafts.nodes(_draft())
-    if st.session_state.get("node") not in options:
-        st.session_state["node"] = options[0]
+    ensure_offered("node", options)
     node = st.selectbox("Node to move", options, key="node")
     coordinates = st.container(horizontal=True)
     for axis in (0, 1):
@@ -93,23 +95,21 @@ def _renew_coordinates() -> None:
 def _field(name: str) -> None:
     """The widget that suits a parameter; what it is given goes into the draft as it is."""
     key, label = f"field-{st.session_state['edition']}-{name}", drafts.label(name)
-    value, symbol = _draft()[name], FIELDS[name].metadata["symbol"] or None
-    if KINDS[name] is bool:
-        st.session_state.setdefault(key, value)
-        st.toggle(label, key=key, on_change=_store, args=(key, name, bool), help=symbol)
-    elif KINDS[name] is str:
-        st.session_state.setdefault(key, value)
-        st.selectbox(label, CHOICES[name], key=key, on_change=_store, args=(key, name, str))
-    elif KINDS[name] is int:
-        st.session_state.setdefault(key, value)
-        st.number_input(
-            label, step=1, key=key, on_change=_store, args=(key, name, int), help=symbol
-        )
+    value, kind = _draft()[name], KINDS[name]
+    st.session_state.setdefault(key, value if kind in _AS_ENTERED else drafts.shown(value))
+    own: Any = {"key": key, "on_change": _store, "args": (key, name)}
+    own["help"] = FIELDS[name].metadata["symbol"] or None
+    if kind is bool:
+        st.toggle(label, **own)
+    elif kind is str:
+        st.selectbox(label, CHOICES[name], **own)
+    elif kind is int:
+        st.number_input(label, step=1, **own)
     else:
-        st.session_state.setdefault(key, drafts.shown(value))
-        read: Callable[[str], Any] = lambda text: drafts.read(name, text)  # noqa: E731
-        st.text_input(label, key=key, on_change=_store, args=(key, name, read), help=symbol)
+        st.text_input(label, **own)
 
 
-def _store(key: str, name: str, read: Callable[[Any], Any]) -> None:
-    st.session_state["draft"] = {**_draft(), name: read(st.session_state[key])}
+def _store(key: str, name: str) -> None:
+    entered = st.session_state[key]
+    value = entered if KINDS[name] in _AS_ENTERED else drafts.read(name, entered)
+    st.session_state["draft"] = {**_draft(), name: value}

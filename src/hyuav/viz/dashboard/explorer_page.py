@@ -17,7 +17,7 @@ from hyuav.viz.dashboard import draft as drafts
 from hyuav.viz.dashboard.draft_widgets import editor, place
 from hyuav.viz.dashboard.flights_page import player
 from hyuav.viz.dashboard.overlay import QUANTITIES, add_flights, explorer_map
-from hyuav.viz.dashboard.plain import plain, refusals
+from hyuav.viz.dashboard.plain import ensure_offered, plain, refusals
 from hyuav.viz.data.flying import (
     COARSE_DRAWS,
     EPISODES,
@@ -59,6 +59,9 @@ BEST = ("checkpoints", "best.pt")
 """Where a run keeps its best weights."""
 
 
+_map = lru_cache(maxsize=32)(explorer_map)
+
+
 def show(index: RunIndex) -> None:
     """The page."""
     st.header("Scenario explorer", anchor=False)
@@ -90,8 +93,7 @@ def _choose_beginning(index: RunIndex) -> None:
         *(SAVED + name for name in drafts.saved(index.root)),
         *(RUN + entry.name for entry in index.entries()),
     ]
-    if st.session_state.get("begin") not in options:
-        st.session_state["begin"] = options[0]
+    ensure_offered("begin", options)
     st.selectbox("Begin with", options, key="begin", on_change=_load, args=(index,))
     if problem := st.session_state.pop("begin_problem", None):
         st.error(plain(problem))
@@ -142,7 +144,7 @@ def _save(root: Path, scenario: Scenario) -> None:
         with refusals():
             path = drafts.save(scenario, root, name, replace=replace)
             st.success(f"Saved as {plain(path)}. To train on it:")
-            command = f"python recipes/train.py --config-dir '{root}' scenario={name}"
+            command = f"hyuav train --config-dir '{root}' scenario={name}"
             st.code(command, language="sh", wrap_lines=True)
 
 
@@ -155,9 +157,10 @@ def _explore(index: RunIndex, scenario: Scenario) -> Evaluation | None:
     )
     checkpoint = _pilot(index, rule)
     evaluation = _flown(scenario, rule, checkpoint)
+    figure = go.Figure(_map(scenario, rule, mapped))
     if evaluation is not None:
         _tell(evaluation, rule)
-    figure = _figure(scenario, rule, mapped, evaluation)
+        add_flights(figure, scenario, evaluation.flights)
     key = f"map-{st.session_state['edition']}-{st.session_state.get('placed', 0)}"
     st.html(_MAP_HEIGHT)
     with st.container(key=MAP, height=_TALLEST, border=False):
@@ -179,8 +182,7 @@ def _pilot(index: RunIndex, rule: str) -> Checkpoint | None:
     """The checkpoint that is to fly, if any."""
     names = [entry.name for entry in index.entries() if index.has(entry.name, *BEST)]
     options = [NOBODY, *names]
-    if st.session_state.get("pilot") not in options:
-        st.session_state["pilot"] = NOBODY
+    ensure_offered("pilot", options)
     first, second = st.columns(2)
     name = first.selectbox("Fly the checkpoint of", options, key="pilot")
     if name == NOBODY:
@@ -196,8 +198,7 @@ def _pilot(index: RunIndex, rule: str) -> Checkpoint | None:
         if not labels:
             second.selectbox("Learner", [], placeholder=f"none for {rule}", disabled=True)
             return None
-        if st.session_state.get("pilot_learner") not in labels:
-            st.session_state["pilot_learner"] = next(iter(labels))
+        ensure_offered("pilot_learner", list(labels))
         number = second.selectbox(
             "Learner", list(labels), format_func=labels.__getitem__, key="pilot_learner"
         )
@@ -243,18 +244,6 @@ def _tell(evaluation: Evaluation, rule: str) -> None:
         )
 
 
-@lru_cache(maxsize=32)
-def _map(scenario: Scenario, rule: str, mapped: str) -> go.Figure:
-    return explorer_map(scenario, rule, mapped)
-
-
-def _figure(scenario: Scenario, rule: str, mapped: str, evaluation: Evaluation | None) -> go.Figure:
-    figure = go.Figure(_map(scenario, rule, mapped))
-    if evaluation is not None:
-        add_flights(figure, scenario, evaluation.flights)
-    return figure
-
-
 def _place(key: str) -> None:
     """Move the chosen node to where the map was clicked."""
     points = st.session_state[key]["selection"]["points"]
@@ -285,8 +274,7 @@ def _play(scenario: Scenario, evaluation: Evaluation) -> None:
     if not st.toggle("Play a flight slot by slot", key="play"):
         return
     schemes = list(evaluation.summary["schemes"])
-    if st.session_state.get("played") not in schemes:
-        st.session_state["played"] = schemes[0]
+    ensure_offered("played", schemes)
     scheme = st.selectbox("Flight of", schemes, format_func=scheme_label, key="played")
     with refusals():
         player(scenario, evaluation.flights, scheme, 0)

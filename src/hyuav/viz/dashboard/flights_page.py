@@ -10,7 +10,7 @@ import streamlit as st
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import FLIGHTS_FILE
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.dashboard.plain import plain, refusals
+from hyuav.viz.dashboard.plain import ensure_offered, plain, refusals
 from hyuav.viz.data.flying import checkpoint_of, flown_by, learner_label
 from hyuav.viz.data.index import RunIndex, Stamp
 from hyuav.viz.data.reading import read_flights
@@ -43,7 +43,7 @@ def show(index: RunIndex) -> None:
     if not names:
         st.info(
             f"No run in {plain(index.root)} has flights or a checkpoint yet. "
-            "`python recipes/evaluate.py run=DIRECTORY` evaluates one."
+            "`hyuav evaluate run=DIRECTORY` evaluates one."
         )
         return
     if st.session_state.get("flown_run") not in names:
@@ -57,8 +57,7 @@ def show(index: RunIndex) -> None:
         format_func=lambda name: f"{name} (evaluation)" if name in evaluations else name,
         key="flown_run",
     )
-    if st.session_state.get("flown_source") not in sources[run]:
-        st.session_state["flown_source"] = sources[run][0]
+    ensure_offered("flown_source", sources[run])
     source = second.selectbox("Flights", sources[run], key="flown_source")
     with refusals():
         kept = source == KEPT_FLIGHTS
@@ -105,8 +104,7 @@ def _flown_now(index: RunIndex, name: str) -> tuple[Scenario, pd.DataFrame]:
     configuration = index.run(name).configuration()
     learners = configuration.learners
     labels = [learner_label(learner, configuration.scenario) for learner in learners]
-    if st.session_state.get("flown_learner") not in range(len(labels)):
-        st.session_state["flown_learner"] = 0
+    ensure_offered("flown_learner", range(len(labels)))
     number = st.selectbox(
         "Learner", range(len(labels)), format_func=labels.__getitem__, key="flown_learner"
     )
@@ -119,14 +117,12 @@ def _flown_now(index: RunIndex, name: str) -> tuple[Scenario, pd.DataFrame]:
 
 def _play(scenario: Scenario, flights: pd.DataFrame) -> None:
     schemes = list(dict.fromkeys(flights["scheme"].astype(str)))
-    if st.session_state.get("flown_scheme") not in schemes:
-        st.session_state["flown_scheme"] = schemes[0]
+    ensure_offered("flown_scheme", schemes)
     first, second = st.columns([2, 1])
     scheme = first.selectbox("Scheme", schemes, format_func=scheme_label, key="flown_scheme")
     own = flights[flights["scheme"] == scheme]
     episodes = sorted(int(episode) for episode in own["episode"].unique())
-    if st.session_state.get("flown_episode") not in episodes:
-        st.session_state["flown_episode"] = episodes[0]
+    ensure_offered("flown_episode", episodes)
     episode = second.selectbox("Episode", episodes, key="flown_episode")
     player(scenario, flights, scheme, episode)
 

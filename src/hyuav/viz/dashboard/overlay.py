@@ -36,7 +36,7 @@ def explorer_map(scenario: Scenario, rule: str, quantity: str) -> go.Figure:
     figure = map_figure(scenario, brings, mode)
     if quantity == "coverage":
         figure.data[0].update(
-            z=brings.offloading(mode),
+            z=brings.offloading[mode],
             zmax=scenario.num_ues,
             colorscale="Cividis",
             hovertemplate="helper at (%{x:.0f}, %{y:.0f}) m: %{z} UEs<extra></extra>",

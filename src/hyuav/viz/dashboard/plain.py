@@ -1,8 +1,9 @@
-"""Text of unknown origin on a page: shown as it is, never as a link, a picture or a formula."""
+"""What the pages share: text of unknown origin that stays text, refusals, and choices."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import streamlit as st
 
@@ -12,7 +13,7 @@ _MARKED = re.compile(r"([\\`*_{}\[\]()#+\-.!|<>~$:&@/\"'])")
 
 
 def plain(text: object) -> str:
-    """Markdown that shows the text itself, on one line."""
+    """Markdown that shows the text itself on one line, no link, picture or formula."""
     return _MARKED.sub(r"\\\1", " ".join(str(text).split()))
 
 
@@ -23,3 +24,9 @@ def refusals() -> Iterator[None]:
         yield
     except InputError as error:
         st.error(plain(error))
+
+
+def ensure_offered(key: str, options: Sequence[Any]) -> None:
+    """Choose the first option where what a widget holds is not, or no longer, offered."""
+    if st.session_state.get(key) not in options:
+        st.session_state[key] = options[0]

@@ -30,6 +30,9 @@ _ROW, _TABLE = 35, 290
 _LETTER = 6.5
 """Width in pixels of a table's letters."""
 
+_BEST, _BEGUN = "Best return (bps/Hz)", "Begun (UTC)"
+"""Columns of the list that are not shown as they are."""
+
 
 def show(index: RunIndex) -> None:
     """The page; while it follows trainings, it is renewed every few seconds."""
@@ -43,7 +46,7 @@ def show(index: RunIndex) -> None:
 def _page(index: RunIndex) -> None:
     entries = index.entries()
     if not entries:
-        st.info(f"No runs in {plain(index.root)} yet: `python recipes/train.py` begins one.")
+        st.info(f"No runs in {plain(index.root)} yet: `hyuav train` begins one.")
         return
     now = time.time()
     found = _filtered(entries, now)
@@ -88,28 +91,25 @@ def _filtered(entries: Sequence[RunEntry], now: float) -> list[RunEntry]:
 
 def _several(label: str, key: str, options: set[str]) -> list[str]:
     """Some of the options, of which those chosen earlier may be gone."""
-    _keep(key, [value for value in st.session_state.get(key, []) if value in options])
+    chosen = st.session_state.setdefault(key, [])
+    kept = [value for value in chosen if value in options]
+    if kept != chosen:  # set needlessly, a choice made during this renewal would be taken back
+        st.session_state[key] = kept
     return st.multiselect(label, sorted(options), key=key)
-
-
-def _keep(key: str, values: list[str]) -> None:
-    """Set a widget only if need be, or a choice made during this renewal would be taken back."""
-    if st.session_state.get(key) != values:
-        st.session_state[key] = values
 
 
 def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
     return pd.DataFrame(
         {
-            "run": [entry.name for entry in entries],
-            "state": [entry.state(now) for entry in entries],
-            "episode": [_episodes(entry) for entry in entries],
-            "best": [entry.best for entry in entries],
-            "scenario": [entry.scenario for entry in entries],
-            "algorithm": [entry.algorithm for entry in entries],
-            "schemes": [", ".join(entry.schemes) for entry in entries],
-            "learners": [entry.learners for entry in entries],
-            "begun": pd.to_datetime([round(entry.begun) for entry in entries], unit="s", utc=True),
+            "Run": [entry.name for entry in entries],
+            "State": [entry.state(now) for entry in entries],
+            "Episode": [_episodes(entry) for entry in entries],
+            _BEST: [entry.best for entry in entries],
+            "Scenario": [entry.scenario for entry in entries],
+            "Algorithm": [entry.algorithm for entry in entries],
+            "Mode chosen by": [", ".join(entry.schemes) for entry in entries],
+            "Learners": [entry.learners for entry in entries],
+            _BEGUN: pd.to_datetime([round(entry.begun) for entry in entries], unit="s", utc=True),
         }
     )
 
@@ -117,23 +117,15 @@ def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
 def _name_column(names: Iterable[str]) -> Any:
     """A column as wide as the longest name, since tables cut what is longer."""
     longest = max(map(len, names), default=0)
-    return st.column_config.TextColumn("Run", width=max(round(_LETTER * longest) + 18, 100))
+    return st.column_config.TextColumn(width=max(round(_LETTER * longest) + 18, 100))
 
 
 def _columns(names: Iterable[str]) -> dict[str, Any]:
     column = st.column_config
     return {
-        "run": _name_column(names),
-        "state": column.TextColumn("State"),
-        "episode": column.TextColumn("Episode"),
-        "best": column.NumberColumn(
-            "Best return (bps/Hz)", format="%.2f", help="of a learner, noise-free"
-        ),
-        "scenario": column.TextColumn("Scenario"),
-        "algorithm": column.TextColumn("Algorithm"),
-        "schemes": column.TextColumn("Mode chosen by"),
-        "learners": column.NumberColumn("Learners"),
-        "begun": column.DatetimeColumn("Begun (UTC)", format="YYYY-MM-DD HH:mm", timezone="UTC"),
+        "Run": _name_column(names),
+        _BEST: column.NumberColumn(format="%.2f", help="of a learner, noise-free"),
+        _BEGUN: column.DatetimeColumn(format="YYYY-MM-DD HH:mm", timezone="UTC"),
     }
 
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ import pandas as pd
 
 from hyuav._support.errors import InputError
 from hyuav.envs.rendering import OKABE_ITO
-from hyuav.experiments.comparison.plan import ENTRIES, LAYOUT, PIECES, Compare
+from hyuav.experiments.comparison.plan import LAYOUT, PIECES, Compare
 from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.experiments.comparison.statistics import performance_profiles
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
@@ -19,11 +19,6 @@ from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.viz.data.reading import readable_config, readable_table
 
 _OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
-
-ENTRY_COLORS = {name: OKABE_ITO[_OTHERS[i % len(_OTHERS)]] for i, name in enumerate(ENTRIES)} | {
-    PEER: OKABE_ITO["vermillion"]
-}
-"""The same color for an algorithm in every figure."""
 
 _UNKNOWN = "#777777"
 """Of an algorithm or a piece that is not offered now: another user's own, an earlier version's."""
@@ -34,13 +29,12 @@ _CURVES = {"episode", "fraction"} | _IDENTITY
 
 
 def entry_color(entry: str) -> str:
-    """An entry's color; a variant without a piece has that of the piece."""
+    """An entry's color in every figure; a variant without a piece has that of the piece."""
+    if entry == PEER:
+        return OKABE_ITO["vermillion"]
     piece = entry.partition("-")[2]
-    if piece in PIECES:
-        return OKABE_ITO[_OTHERS[PIECES.index(piece) % len(_OTHERS)]]
-    own = list(ALGORITHMS).index(entry) if entry in ALGORITHMS else None
-    known = _UNKNOWN if own is None else OKABE_ITO[_OTHERS[own % len(_OTHERS)]]
-    return _UNKNOWN if piece else ENTRY_COLORS.get(entry, known)
+    name, known = (piece, PIECES) if piece else (entry, tuple(ALGORITHMS))
+    return OKABE_ITO[_OTHERS[known.index(name) % len(_OTHERS)]] if name in known else _UNKNOWN
 
 
 def entry_line(entry: str) -> int:
@@ -90,7 +84,7 @@ class ReadableComparison:
         self.threshold = 0.97
         if isinstance(value, int | float) and 0 <= value <= 1:
             self.threshold = float(value)
-        self._asked = _Asked.of(self.config)
+        self._asked = _asked(self.config)
 
     @property
     def results(self) -> pd.DataFrame | None:
@@ -104,18 +98,7 @@ class ReadableComparison:
 
     def trained(self) -> list[TrainedEntry]:
         """The finished trainings: the longest horizons first, and presets before layouts."""
-        return sorted(self._trained(), key=self._asked.flown)
-
-    def _rows(self, name: str, columns: set[str]) -> pd.DataFrame | None:
-        paths = [path / name for path in self._finished()] or [self.directory / name]
-        read = (readable_table(path, columns) for path in paths)
-        tables = sorted((table for table in read if table is not None), key=self._asked.place)
-        return pd.concat(tables, ignore_index=True) if tables else None
-
-    def _finished(self) -> list[Path]:
-        return sorted(path.parent for path in self.directory.glob(f"shards/*/{RESULTS_FILE}"))
-
-    def _trained(self) -> Iterator[TrainedEntry]:
+        found = []
         for path in self._finished():
             run = RunDirectory(path)
             try:
@@ -125,47 +108,50 @@ class ReadableComparison:
             horizon = f"_T{configuration.scenario.num_slots}"
             entry = path.name.partition(f"_{configuration.scenario_name}{horizon}")[0]
             if run.best_checkpoint.is_file():
-                yield TrainedEntry(entry, run, configuration)
+                found.append(TrainedEntry(entry, run, configuration))
+        return sorted(found, key=self._flown)
 
+    def _rows(self, name: str, columns: set[str]) -> pd.DataFrame | None:
+        paths = [path / name for path in self._finished()] or [self.directory / name]
+        read = (readable_table(path, columns) for path in paths)
+        tables = sorted((table for table in read if table is not None), key=self._place)
+        return pd.concat(tables, ignore_index=True) if tables else None
 
-class _Asked(NamedTuple):
-    """The order in which a comparison was asked for; what is unknown comes last."""
+    def _finished(self) -> list[Path]:
+        return sorted(path.parent for path in self.directory.glob(f"shards/*/{RESULTS_FILE}"))
 
-    entries: Sequence[str] = ()
-    scenarios: Sequence[str] = ()
-    horizons: Sequence[int] = ()
+    def _place(self, table: pd.DataFrame) -> list[int]:
+        """By which the tables of trainings are sorted."""
+        first = table[["algorithm", "scenario", "num_slots"]].iloc[0]
+        return [_index(asked, own) for asked, own in zip(self._asked, first, strict=True)]
 
-    @classmethod
-    def of(cls, config: Mapping[str, Any]) -> "_Asked":
-        """Of a comparison's ``config.yaml``, which may be damaged or of another version."""
-        names = [field.name for field in dataclasses.fields(Compare)]
-        try:
-            asked = Compare.from_dict({name: config[name] for name in names if name in config})
-        except InputError:
-            return cls()
-        return cls(asked.entries, asked.scenario, asked.num_slots)
-
-    def place(self, table: pd.DataFrame) -> tuple[int, int, int]:
-        """Of a training's table."""
-        algorithm, scenario, num_slots = table[["algorithm", "scenario", "num_slots"]].iloc[0]
-        return (
-            _index(self.entries, algorithm),
-            _index(self.scenarios, scenario),
-            _index(self.horizons, num_slots),
-        )
-
-    def flown(self, trained: TrainedEntry) -> tuple[Any, ...]:
-        """Of a training's flight."""
+    def _flown(self, trained: TrainedEntry) -> tuple[Any, ...]:
+        """By which the flights of trainings are sorted."""
+        entries, scenarios, _ = self._asked
         name = trained.configuration.scenario_name
         return (
             name.startswith(LAYOUT),
             -trained.configuration.scenario.num_slots,
-            _index(self.scenarios, name),
+            _index(scenarios, name),
             name,
-            _index(self.entries, trained.entry),
+            _index(entries, trained.entry),
         )
 
 
+def _asked(config: Mapping[str, Any]) -> tuple[Sequence[Any], Sequence[Any], Sequence[Any]]:
+    """The entries, scenarios and horizons of a comparison, in the order that was asked for.
+
+    None where its ``config.yaml`` is damaged or of another version.
+    """
+    names = [field.name for field in dataclasses.fields(Compare)]
+    try:
+        asked = Compare.from_dict({name: config[name] for name in names if name in config})
+    except InputError:
+        return (), (), ()
+    return asked.entries, asked.scenario, asked.num_slots
+
+
 def _index(values: Sequence[Any], value: object) -> int:
+    """The place among what was asked for; what is unknown comes last."""
     told = [str(own) for own in values]
     return told.index(str(value)) if str(value) in told else len(told)

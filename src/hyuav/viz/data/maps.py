@@ -24,31 +24,10 @@ class HelperMap(NamedTuple):
 
     axis: NDArray[np.float64]
     """The coordinates along x, and along y: (N,) m."""
-    relay: NDArray[np.float64]
-    """C_1: (N, N) bps/Hz."""
-    jamming: NDArray[np.float64]
-    """C_0: (N, N) bps/Hz."""
-    relay_offloading: NDArray[np.int64]
-    """How many UEs offload while the helper relays: (N, N)."""
-    jamming_offloading: NDArray[np.int64]
-    """How many UEs offload while the helper jams: (N, N)."""
-    prefers_relay: NDArray[np.bool_]
-    """Where relaying is the better mode: (N, N)."""
-
-    @property
-    def better(self) -> NDArray[np.float64]:
-        """What the better mode brings: (N, N) bps/Hz."""
-        return np.maximum(self.relay, self.jamming)
-
-    def rates(self, mode: Mode) -> NDArray[np.float64]:
-        """The secrecy sum-rates in a mode: (N, N) bps/Hz."""
-        return {"relay": self.relay, "jamming": self.jamming, "better": self.better}[mode]
-
-    def offloading(self, mode: Mode) -> NDArray[np.int64]:
-        """How many UEs offload in a mode: (N, N)."""
-        relay, jamming = self.relay_offloading, self.jamming_offloading
-        better = np.where(self.prefers_relay, relay, jamming)
-        return {"relay": relay, "jamming": jamming, "better": better}[mode]
+    rates: dict[Mode, NDArray[np.float64]]
+    """The secrecy sum-rates in each mode, C_1 of relaying and C_0 of jamming: (N, N) bps/Hz."""
+    offloading: dict[Mode, NDArray[np.int64]]
+    """How many UEs offload in each mode: (N, N)."""
 
     def table(self) -> pd.DataFrame:
         """Row by row from the south-west: ``x`` and ``y`` in m, and the sum-rates in bps/Hz.
@@ -56,9 +35,8 @@ class HelperMap(NamedTuple):
         These are ``relay``, ``jamming``, and the ``better`` of both.
         """
         x, y = np.meshgrid(self.axis, self.axis)
-        columns = {"x": x, "y": y, "relay": self.relay, "jamming": self.jamming}
-        columns |= {"better": self.better}
-        return pd.DataFrame({name: values.ravel() for name, values in columns.items()})
+        columns = [("x", x), ("y", y), *self.rates.items()]
+        return pd.DataFrame({name: values.ravel() for name, values in columns})
 
 
 def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
@@ -78,9 +56,12 @@ def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
     nodes, hovering = physics.nodes._replace(helper=positions), Control(torch.zeros_like(positions))
     over = slot(physics, nodes, hovering, tasks=mean_tasks(scenario, torch.float64))
     modes = over.relay, over.jamming
-    rates = torch.broadcast_tensors(*(mode.sum_rate for mode in modes))
-    counts = (mode.offloading.expand(*x.shape, -1).sum(dim=-1) for mode in modes)
+    relay, jamming = torch.broadcast_tensors(*(mode.sum_rate for mode in modes))
+    relaying, jammed = (mode.offloading.expand(*x.shape, -1).sum(dim=-1) for mode in modes)
+    chosen = torch.where(prefers_relay(relay, jamming), relaying, jammed)
+    better = torch.maximum(relay, jamming)
     return HelperMap(
         axis.numpy(),
-        *(values.numpy() for values in (*rates, *counts, prefers_relay(*rates))),
+        {"relay": relay.numpy(), "jamming": jamming.numpy(), "better": better.numpy()},
+        {"relay": relaying.numpy(), "jamming": jammed.numpy(), "better": chosen.numpy()},
     )

@@ -9,14 +9,13 @@ from hyuav._support.errors import InputError
 from hyuav._support.formatting import percent
 from hyuav.experiments.comparison.statistics import summarize_algorithms, summarize_cells
 from hyuav.experiments.comparison.tables import label, stopped
-from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.comparison import ReadableComparison, TrainedEntry
 from hyuav.viz.data.flying import fly_first_learner
 from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html.comparison_figures import comparison_figures
 from hyuav.viz.html.document import Page, Picture, Section
 from hyuav.viz.html.player import flight_player
-from hyuav.viz.html.run import PLAYER_HEIGHT, config_section, map_section
+from hyuav.viz.html.run import config_section, map_section
 from hyuav.viz.html.tables import algorithms_table, cells_table
 
 MAX_FLIGHTS, MAX_MAPS = 8, 2
@@ -27,10 +26,11 @@ def comparison_page(directory: Path) -> Page:
     """What a comparison's directory tells, however much of it is there yet."""
     comparison = ReadableComparison(directory)
     threshold, results, runs = comparison.threshold, comparison.results, comparison.trained()
+    scenarios = {trained.scenario_name: trained.scenario for _, _, trained in reversed(runs)}
     sections = [
         *_results(results, comparison.curves, threshold),
         _flights(runs[:MAX_FLIGHTS]),
-        map_section(dict(list(_scenarios(runs).items())[:MAX_MAPS])),
+        map_section(dict(list(scenarios.items())[:MAX_MAPS])),
         config_section(comparison.config),
     ]
     facts = {"Share that counts as solved": percent(threshold, None)}
@@ -50,17 +50,10 @@ def _results(
         return
     cells = summarize_cells(results, threshold)
     for title, name, figure in comparison_figures(results, curves, cells, threshold):
-        yield Section(title, (), [Picture(name, {"": figure}, int(figure.layout.height))])
+        yield Section(title, (), [Picture(name, {"": figure})])
     algorithms = summarize_algorithms(results, threshold)
     tables = [algorithms_table(algorithms, threshold), cells_table(cells, threshold)]
     yield Section("Results", stopped(results), (), tables)
-
-
-def _scenarios(runs: Sequence[TrainedEntry]) -> dict[str, Scenario]:
-    return {
-        configuration.scenario_name: configuration.scenario
-        for _, _, configuration in reversed(runs)
-    }
 
 
 def _flights(runs: Sequence[TrainedEntry]) -> Section:
@@ -81,4 +74,4 @@ def _flights(runs: Sequence[TrainedEntry]) -> Section:
         "The best weights of each algorithm's first learner, flown for this report; of the longest "
         f"horizons, and at most {MAX_FLIGHTS}."
     )
-    return Section("Flights", notes, [Picture("Flight", figures, PLAYER_HEIGHT)])
+    return Section("Flights", notes, [Picture("Flight", figures)])

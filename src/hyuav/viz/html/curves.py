@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 import plotly.graph_objects as go
 
+from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
 from hyuav.viz.data.curves import NOISY, RETURNS, SMOOTHING, LearningCurve, learning_curves
 from hyuav.viz.data.schemes import GREY, mode_rule, scheme_color, scheme_label, scheme_line
 from hyuav.viz.html.style import DASHES, axis, base_layout, legend_below, plain, translucent
@@ -19,9 +20,6 @@ QUANTITIES = {name: RETURNS[name] for name in (NOISY, "evaluation", "best_evalua
 _HORIZON_MARKERS = ("circle", "square", "triangle-up", "diamond")
 _MARKERS = 12
 """Of a line, where they tell horizons apart."""
-
-_WIDTH_AND_OPACITY = {"own": (2.2, 1.0), "paper": (1.3, 0.6)}
-"""Of the line of what is learned, and of the same by the paper's own algorithm."""
 
 
 def learning_figure(
@@ -54,7 +52,8 @@ def learning_figure(
     if len(horizons) <= 1:
         _add_optima(figure, curves, optima or {})
     if not curves:
-        _say(figure, "no episodes yet")
+        font, middle = {"size": 15}, {"xref": "paper", "x": 0.5, "yref": "paper", "y": 0.5}
+        figure.add_annotation(text="no episodes yet", showarrow=False, font=font, **middle)
     figure.update_layout(
         height=460,
         margin={"l": 60, "r": 15, "t": 25, "b": 110},
@@ -68,8 +67,8 @@ def learning_figure(
 
 def _look(scheme: str) -> dict[str, Any]:
     """A scheme's line, as :meth:`plotly.graph_objects.Figure.add_scatter` takes it."""
-    kind = "paper" if scheme.endswith("_paper") else "own"
-    hue, (width, opacity) = scheme_color(scheme), _WIDTH_AND_OPACITY[kind]
+    hue = scheme_color(scheme)
+    width, opacity = (1.3, 0.6) if scheme in LEARNED_AS_IN_PAPER.values() else (2.2, 1.0)
     line = {"color": hue, "dash": DASHES[scheme_line(scheme)], "width": width}
     return {"mode": "lines", "marker": {"color": hue}, "line": line, "opacity": opacity}
 
@@ -136,9 +135,3 @@ def _add_optima(
     if values:
         line = {"color": GREY, "width": 1.4, "dash": DASHES["dotted"]}
         figure.add_scatter(x=[None], y=[None], mode="lines", line=line, name="its optimum")
-
-
-def _say(figure: go.Figure, text: str) -> None:
-    figure.add_annotation(
-        text=text, x=0.5, y=0.5, xref="paper", yref="paper", showarrow=False, font={"size": 15}
-    )

@@ -5,15 +5,12 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 from typing import NamedTuple
 
 import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
-
-from hyuav._support.files import write_durably
 
 
 class Picture(NamedTuple):
@@ -23,10 +20,13 @@ class Picture(NamedTuple):
     """Tells what is chosen among."""
     figures: Mapping[str, go.Figure]
     """By their names."""
-    height: int
-    """Of the largest in pixels, which is kept free until it is drawn."""
     small: bool = False
     """Whether several stand side by side on a wide page."""
+
+    @property
+    def height(self) -> int:
+        """Of the largest in pixels, which is kept free until it is drawn."""
+        return max(int(figure.layout.height) for figure in self.figures.values())
 
 
 class Section(NamedTuple):
@@ -51,19 +51,6 @@ class Page(NamedTuple):
     title: str
     facts: Mapping[str, str]
     sections: Sequence[Section]
-
-
-def write_page(page: Page, path: Path) -> Path:
-    """Write the page whole or not at all.
-
-    Returns:
-        the path.
-
-    Raises:
-        OSError: it cannot be written; then an earlier one is still there.
-    """
-    write_durably(path, render(page).encode("utf-8", errors="replace"))
-    return path
 
 
 def render(page: Page) -> str:

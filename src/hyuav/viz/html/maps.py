@@ -14,9 +14,6 @@ from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.maps import HelperMap, Mode, helper_map
 from hyuav.viz.html.style import base_layout, square_map, translucent
 
-HEIGHT = 480
-"""Of the figure in pixels."""
-
 TITLES: dict[Mode, str] = {"relay": "Relay", "jamming": "Jamming", "better": "Better mode"}
 
 
@@ -35,16 +32,16 @@ def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 
     return map_figure(scenario, helper_map(scenario, resolution), mode)
 
 
-def map_figure(scenario: Scenario, rates: HelperMap, mode: Mode) -> go.Figure:
+def map_figure(scenario: Scenario, brings: HelperMap, mode: Mode) -> go.Figure:
     """What :func:`sum_rate_map` draws, of a map that is computed already."""
-    shown = rates.rates(mode).astype(np.float32)
+    axis, rates = brings.axis, brings.rates
     figure = go.Figure(layout=base_layout())
     figure.add_heatmap(
-        x=rates.axis,
-        y=rates.axis,
-        z=shown,
+        x=axis,
+        y=axis,
+        z=rates[mode].astype(np.float32),
         zmin=0.0,
-        zmax=max(float(rates.better.max()), 1e-6),
+        zmax=max(float(rates["better"].max()), 1e-6),
         colorscale="Viridis",
         colorbar={
             "title": {"text": "Secrecy sum-rate (bps/Hz)", "side": "bottom"},
@@ -56,12 +53,12 @@ def map_figure(scenario: Scenario, rates: HelperMap, mode: Mode) -> go.Figure:
         hovertemplate="helper at (%{x:.0f}, %{y:.0f}) m: %{z:.2f} bps/Hz<extra></extra>",
     )
     if mode == "better":
-        _outline(figure, rates.axis, rates.jamming > rates.relay, "dash")
-        _outline(figure, rates.axis, rates.relay > rates.jamming, "solid")
+        _outline(figure, axis, rates["jamming"] > rates["relay"], "dash")
+        _outline(figure, axis, rates["relay"] > rates["jamming"], "solid")
     _add_nodes(figure, scenario)
     figure.update_layout(
         title={"text": TITLES[mode], "x": 0.5, "xanchor": "center", "font": {"size": 14}},
-        height=HEIGHT,
+        height=480,
         margin={"l": 50, "r": 15, "t": 35, "b": 125},
         showlegend=False,
         **square_map(scenario.map_side / 2),
@@ -86,7 +83,6 @@ def _outline(
 
 
 def _add_nodes(figure: go.Figure, scenario: Scenario) -> None:
-    x, y = zip(*scenario.ue_positions, strict=True)
     (left, bottom), radius = scenario.legitimate_position, scenario.coverage_radius
     figure.add_shape(
         type="circle",
@@ -96,27 +92,20 @@ def _add_nodes(figure: go.Figure, scenario: Scenario) -> None:
         y1=bottom + radius,
         line={"color": translucent("#FFFFFF", 0.8), "width": 1, "dash": "dot"},
     )
-    nodes = (
-        ("UE", x, y, {"size": 6, "color": "#000000"}),
-        (LEGITIMATE_LABEL, *_at(scenario.legitimate_position, "square", LEGITIMATE_COLOR)),
-        (
-            EAVESDROPPER_LABEL,
-            *_at(scenario.eavesdropper_positions[0], "triangle-down", EAVESDROPPER_COLOR),
-        ),
-    )
-    for name, across, up, marker in nodes:
+    legitimate, eavesdropper = scenario.legitimate_position, scenario.eavesdropper_positions[0]
+    for name, places, size, symbol, color in (
+        ("UE", scenario.ue_positions, 6, None, "#000000"),
+        (LEGITIMATE_LABEL, [legitimate], 13, "square", LEGITIMATE_COLOR),
+        (EAVESDROPPER_LABEL, [eavesdropper], 13, "triangle-down", EAVESDROPPER_COLOR),
+    ):
+        x, y = zip(*places, strict=True)
+        edge = {"color": "white", "width": 1}
         figure.add_scatter(
-            x=list(across),
-            y=list(up),
+            x=x,
+            y=y,
             name=name,
             mode="markers",
-            marker={"line": {"color": "white", "width": 1}} | marker,
+            marker={"size": size, "symbol": symbol, "color": color, "line": edge},
             hovertemplate=f"{name}<br>(%{{x:.0f}}, %{{y:.0f}}) m<extra></extra>",
             cliponaxis=False,
         )
-
-
-def _at(
-    position: tuple[float, float], symbol: str, color: str
-) -> tuple[list[float], list[float], dict[str, object]]:
-    return [position[0]], [position[1]], {"size": 13, "symbol": symbol, "color": color}

@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from hyuav._support.errors import InputError, rejection
+from hyuav._support.files import write_durably
 from hyuav.experiments.run_directory import REPORT_FILE, require_writable
 from hyuav.viz.data.comparison import is_comparison
 from hyuav.viz.html.comparison import comparison_page
-from hyuav.viz.html.document import write_page
+from hyuav.viz.html.document import render
 from hyuav.viz.html.run import run_page
 
 
@@ -21,11 +22,13 @@ def write_report(directory: str | Path) -> Path:
 
     Raises:
         InputError: there is no such directory, or it cannot be written to.
-        OSError: the report cannot be written, for want of space perhaps.
+        OSError: the report cannot be written, for want of space perhaps; then an earlier one is
+            still there.
     """
     path = Path(directory)
     if not path.is_dir():
         raise InputError(rejection("run", str(path), "an existing directory"))
     require_writable("run", path)
     page = comparison_page(path) if is_comparison(path) else run_page(path)
-    return write_page(page, path / REPORT_FILE)
+    write_durably(path / REPORT_FILE, render(page).encode("utf-8", errors="replace"))
+    return path / REPORT_FILE

@@ -25,12 +25,9 @@ from hyuav.viz.data.runs import (
 from hyuav.viz.data.schemes import scheme_label, scheme_place
 from hyuav.viz.html.curves import MAX_POINTS, QUANTITIES, learning_figure
 from hyuav.viz.html.document import Page, Picture, Section
-from hyuav.viz.html.maps import HEIGHT, TITLES, map_figure
+from hyuav.viz.html.maps import TITLES, map_figure
 from hyuav.viz.html.player import flight_player
 from hyuav.viz.html.tables import configuration_tables, scheme_table
-
-PLAYER_HEIGHT, CURVES_HEIGHT = 740, 460
-
 
 _KEPT = "Flights of the evaluation, each scheme's first."
 _FLOWN_NOW = (
@@ -118,7 +115,7 @@ def _flights(several: Sequence[tuple[Scenario, Evaluation]], note: str) -> Secti
         "slot. The thin lines over the sum-rates are what relaying (solid) and jamming (dashed) "
         "would have brought."
     )
-    pictures = [Picture("Flight", figures, PLAYER_HEIGHT)] if figures else []
+    pictures = [Picture("Flight", figures)] if figures else []
     return Section("Flights", notes, pictures)
 
 
@@ -146,7 +143,7 @@ def _curves(
     ]
     if metrics["scheme"].isin(LEARNED_AS_IN_PAPER.values()).any():
         notes.append("The thinner, paler lines are learned by the paper's own algorithm.")
-    return Section("Learning curves", notes, [Picture("Quantity", figures, CURVES_HEIGHT)])
+    return Section("Learning curves", notes, [Picture("Quantity", figures)])
 
 
 def _schemes(summaries: Sequence[Mapping[str, Any]], notes: Sequence[str]) -> Section:
@@ -163,7 +160,6 @@ def map_section(scenarios: Mapping[str, Scenario]) -> Section:
         Picture(
             f"{title}, {name}",
             {"": map_figure(scenario, rates, mode).update_layout(title=None)},
-            HEIGHT,
             small=True,
         )
         for name, scenario in scenarios.items()

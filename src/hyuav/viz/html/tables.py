@@ -53,9 +53,10 @@ def scheme_table(summary: Mapping[str, Any]) -> Markup:
     Args:
         summary: as :attr:`hyuav.experiments.evaluation.Evaluation.summary`.
     """
+    swatch = Markup('<span class="swatch" style="background:{}"></span>{}')
     rows = [
         (
-            _swatch(scheme_color(scheme), scheme_label(scheme)),
+            swatch.format(scheme_color(scheme), scheme_label(scheme)),
             *flight_cells(result),
             f"{1e3 * result['ue_energy']:.1f}",
             f"{result['edge_energy']:.1f}",
@@ -74,10 +75,6 @@ def scheme_table(summary: Mapping[str, Any]) -> Markup:
         *("Energy of L (J)", "Energy of H (kJ)", "Budgets exceeded"),
     )
     return html_table(caption, headings, rows)
-
-
-def _swatch(color: str, text: str) -> Markup:
-    return Markup('<span class="swatch" style="background:{}"></span>{}').format(color, text)
 
 
 def cells_table(cells: pd.DataFrame, threshold: float) -> Markup:
