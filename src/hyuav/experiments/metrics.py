@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.files import open_regular, read_regular, sync, write_all, write_durably
+from hyuav._support.files import open_regular, read_regular, write_all, write_durably
 from hyuav.physics.offloading import MODE_RULES
 
 METRIC_COLUMNS = (
@@ -104,7 +104,7 @@ class MetricsFile:
 
     def sync(self) -> None:
         """Return when the rows outlast a loss of power."""
-        sync(self._file)
+        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """No more rows follow."""
