@@ -160,13 +160,13 @@ def read_metrics(path: Path) -> pd.DataFrame:
                 and metrics["scheme"].isin(MODE_RULES).all()
             )
         )
-        reason = "" if whole else "damaged"
+        if whole:
+            return metrics
+        reason = "damaged"
     except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else "") or "damaged"
-    if reason:
-        accepted = f"the table that a training writes ({reason})"
-        raise InputError(rejection("metrics", str(path), accepted))
-    return metrics
+        reason = getattr(error, "strerror", None) or "damaged"
+    accepted = f"the table that a training writes ({reason})"
+    raise InputError(rejection("metrics", str(path), accepted))
 
 
 def readable_metrics(path: str | Path) -> pd.DataFrame:
