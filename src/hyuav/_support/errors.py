@@ -64,6 +64,12 @@ def brief(value: object) -> str:
     return shown if len(shown) <= 80 else f"{shown[:77]}..."
 
 
+def cause(error: OSError) -> str:
+    """Why the system refused, behind the file's name where it is known."""
+    reason = error.strerror or str(error)
+    return f"{error.filename}: {reason}" if error.filename else reason
+
+
 def rejection(name: str, value: object, accepted: str) -> str:
     """The one line that answers bad input: field, value (shortened), what is accepted."""
     return f"{name} = {brief(value)}: expected {accepted}"

@@ -7,6 +7,7 @@ import contextlib
 import errno
 import os
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import FileIO
@@ -17,7 +18,7 @@ import pandas as pd
 import torch
 from pyarrow.lib import ArrowException
 
-from hyuav._support.errors import InputError, one_line
+from hyuav._support.errors import InputError, one_line, rejection
 from hyuav._support.machine import device_memory
 
 
@@ -85,9 +86,19 @@ def write_all(file: FileIO, content: bytes | memoryview) -> None:
         raise OSError(error.errno, error.strerror, str(file.name)) from None
 
 
-def sync(file: FileIO) -> None:
-    """Return when what was written to the file outlasts a loss of power."""
-    os.fsync(file.fileno())
+def require_writable(name: str, directory: Path) -> None:
+    """Accept a directory that can be written to; make it where there is none.
+
+    Raises:
+        InputError: it cannot be made or written to.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=directory):
+            pass
+    except OSError as error:
+        accepted = f"a writable place ({error.strerror})"
+        raise InputError(rejection(name, str(directory), accepted)) from None
 
 
 def write_durably(path: Path, content: bytes | memoryview, keep: Path | None = None) -> None:
@@ -137,7 +148,7 @@ def _written_beside(path: Path, content: bytes | memoryview) -> Iterator[Path]:
     try:
         with partial.open("wb", buffering=0) as file:
             write_all(file, content)
-            sync(file)
+            os.fsync(file.fileno())
         yield partial
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from None

@@ -139,10 +139,11 @@ def refuse_unknown(owner: str, names: Iterable[object], known: Iterable[str]) ->
     known = list(known)
     for name in names:
         if name not in known:
-            raise _unknown(owner, name, known)
+            raise unknown_field(owner, name, known)
 
 
-def _unknown(owner: str, name: object, known: Iterable[str]) -> InputError:
+def unknown_field(owner: str, name: object, known: Iterable[str]) -> InputError:
+    """The refusal of a name, with the most similar known one or else all of them."""
     hint = did_you_mean(str(name)[:80], known).strip(" ()") or f"one of {', '.join(known)}"
     return InputError(f"{owner}: unknown field {brief(name)}: {hint}")
 
@@ -307,6 +308,6 @@ def _of_names(
     if kind in ("unexpected_positional_argument", "multiple_argument_values"):
         return InputTypeError(f"{owner}: {kind.replace('_', ' ')}: {brief(name)}")
     if name not in known:
-        return _unknown(owner, name, known)
+        return unknown_field(owner, name, known)
     missing = kind == "missing" and name not in given
     return InputTypeError(f"{owner}: {name} is missing") if missing else None

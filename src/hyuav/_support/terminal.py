@@ -94,7 +94,8 @@ def print_table(table: Table, console: Console) -> None:
 
 def _print_rows(table: Table, console: Console) -> None:
     console.print(table.title, style="italic", highlight=False)
-    headings = [_in_one_line(str(column.header)) for column in table.columns]
+    # In one line, without the hyphens before its breaks.
+    headings = [" ".join(str(own.header).replace("-\n", "").split()) for own in table.columns]
     for name, *cells in zip(*(column.cells for column in table.columns), strict=True):
         console.print(Text(str(name), style="bold"))
         for heading, cell in zip(headings[1:], cells, strict=True):
@@ -102,11 +103,6 @@ def _print_rows(table: Table, console: Console) -> None:
             console.print(Padding(text, (0, 0, 0, 2), expand=False), highlight=False)
     if table.caption:
         console.print(table.caption, style="italic", highlight=False)
-
-
-def _in_one_line(heading: str) -> str:
-    """A heading without line breaks, nor the hyphens before them."""
-    return " ".join(heading.replace("-\n", "").split())
 
 
 def make_progress(console: Console, description: str, *facts: ProgressColumn) -> Progress:

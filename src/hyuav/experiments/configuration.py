@@ -27,13 +27,15 @@ from hyuav._support.errors import (
     InputError,
     Interrupted,
     brief,
+    cause,
+    did_you_mean,
     harmless,
     one_line,
     rejection,
     require_choice,
 )
 from hyuav._support.interruption import interrupted_by_sigterm
-from hyuav._support.parameters import Parameters, mapping, refuse_unknown
+from hyuav._support.parameters import Parameters, mapping, refuse_unknown, unknown_field
 from hyuav._support.start import loaded, program
 from hyuav.experiments.configuration_files import read_files_as_data
 from hyuav.experiments.own_algorithms import run_named, with_own
@@ -342,19 +344,19 @@ def section(config: Config, parameters: type[Record]) -> Record:
 
 def explain(error: Exception) -> str:
     """One line that says what was wrong and what is accepted."""
-    cause = error.__cause__
+    reason = error.__cause__
     if isinstance(error, MissingConfigException) and error.options is not None:
         group, _, member = str(error.missing_cfg_file).rpartition("/")
-        members = list(error.options)
-        return _message(lambda: require_choice(group, member, members))
-    if isinstance(error, ConfigCompositionException) and isinstance(cause, OmegaConfBaseException):
-        known = cause.parent_node
-        if cause.full_key is not None and isinstance(known, DictConfig):
-            owner, _, key = cause.full_key.rpartition(".")
+        hint = did_you_mean(member, error.options)
+        return rejection(group, member, f"one of {', '.join(error.options)}{hint}")
+    if isinstance(error, ConfigCompositionException) and isinstance(reason, OmegaConfBaseException):
+        known = reason.parent_node
+        if reason.full_key is not None and isinstance(known, DictConfig):
+            owner, _, key = reason.full_key.rpartition(".")
             if key not in known:
                 names = [str(name) for name in known if name != "hydra"]
-                return _message(lambda: refuse_unknown(owner or "configuration", [key], names))
-        error = cause
+                return str(unknown_field(owner or "configuration", key, names))
+        error = reason
     if isinstance(error, MissingMandatoryValue):
         return rejection(str(error.full_key), MISSING, "a value")
     text = str(error).split("\n    full_key")[0].split("\nSee https")[0]
@@ -367,19 +369,10 @@ def _halting(hint: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        line = f"halted: {where}{error.strerror or error}; what was there before is kept"
-        raise Halted(f"{one_line(line)}{hint}") from error
+        line = one_line(f"halted: {cause(error)}; what was there before is kept")
+        raise Halted(f"{line}{hint}") from error
 
 
 def _end(line: str, status: int) -> NoReturn:
     print(f"error: {harmless(line)}", file=sys.stderr)
     sys.exit(status)
-
-
-def _message(check: Callable[[], None]) -> str:
-    try:
-        check()
-    except InputError as error:
-        return str(error)
-    raise AssertionError("the check was expected to fail")

@@ -1,12 +1,12 @@
 """Files of ``--config-dir`` for Hydra as data: nothing in them is run, looked up or obeyed."""
 
-import argparse
 import re
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
+from hydra.main import get_args_parser
 from hydra.core.config_store import ConfigStore
 
 from hyuav._support.errors import InputError, brief, rejection
@@ -14,26 +14,6 @@ from hyuav._support.yaml_files import read_yaml
 
 ORDERS = ("defaults", "hydra", "_target_")
 """Names under which Hydra takes orders: what else to read, where to write, what to call."""
-
-FLAGS = ("help", "hydra-help", "version", "resolve", "run", "multirun")
-
-SHORT = {
-    "help": "-h",
-    "run": "-r",
-    "multirun": "-m",
-    "cfg": "-c",
-    "package": "-p",
-    "info": "-i",
-    "config-path": "-cp",
-    "config-name": "-cn",
-    "config-dir": "-cd",
-}
-
-
-class _Options(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        """Answer in one line, without the usage that Hydra would print first."""
-        raise InputError(message)
 
 
 def read_files_as_data(groups: Iterable[str]) -> None:
@@ -50,33 +30,27 @@ def read_files_as_data(groups: Iterable[str]) -> None:
         InputError: no such directory, a chosen file that cannot be read or holds more than plain
             values, or an option that Hydra does not know.
     """
-    options, overrides = _parser().parse_known_args(sys.argv[1:])
-    given = {name.replace("_", "-"): value for name, value in vars(options).items()}
-    if unknown := [each for each in overrides if each.startswith("-")]:
-        raise InputError(f"unrecognized arguments: {' '.join(unknown)}")
+    parser = get_args_parser()
+    parser.error = _refuse  # type: ignore[method-assign]
+    options = vars(parser.parse_intermixed_args(sys.argv[1:]))
+    overrides = options.pop("overrides")
     searched = any(each.lstrip("+~").startswith("hydra.searchpath") for each in overrides)
-    if searched or given["config-path"]:
+    if searched or options["config_path"]:
         raise InputError("files are read from --config-dir DIR alone")
-    directory = given.pop("config-dir")
+    directory = options.pop("config_dir")
     if directory is not None:
         for group in groups:
             _store_members(Path(directory), group, overrides)
-    flags = [f"--{name}" for name in FLAGS if given.pop(name)]
-    values = [f"--{name}={value}" for name, value in given.items() if value is not None]
-    sys.argv[1:] = [*overrides, *flags, *values]
+    sys.argv[1:] = overrides
+    for name, value in options.items():
+        if value is not None and value is not False:
+            option = f"--{name.replace('_', '-')}"
+            sys.argv.append(option if value is True else f"{option}={value}")
 
 
-def _parser() -> argparse.ArgumentParser:
-    """Of the options that Hydra has."""
-    parser = _Options(add_help=False)
-    for name in FLAGS:
-        parser.add_argument(f"--{name}", *filter(None, [SHORT.get(name)]), action="store_true")
-    parser.add_argument("--cfg", "-c", choices=["job", "hydra", "all"])
-    topics = ["all", "config", "defaults", "defaults-tree", "plugins", "searchpath"]
-    parser.add_argument("--info", "-i", nargs="?", const="all", choices=topics)
-    for name in ("package", "config-path", "config-name", "config-dir", "experimental-rerun"):
-        parser.add_argument(f"--{name}", *filter(None, [SHORT.get(name)]))
-    return parser
+def _refuse(message: str) -> NoReturn:
+    """Answer in one line, without the usage that Hydra would print first."""
+    raise InputError(message)
 
 
 def _store_members(directory: Path, group: str, overrides: Iterable[str]) -> None:

@@ -35,14 +35,14 @@ def select_initial_weights(
 ) -> tuple[dict[str, Tensor], list[float]]:
     """Begin where a higher reward was reached: the best flyer of a few short trainings.
 
-    The paper sets its initial weights so. For each seed of the training, every scheme trains its
-    candidates, and a learner of that seed begins with whichever of them, of any scheme, earns most
-    under the learner's own scheme. They are judged as best weights are, without noise and on the
+    The paper sets its initial weights so. For each seed of the training, every mode rule trains its
+    candidates, and a learner of that seed begins with whichever of them, of any rule, earns most
+    under the learner's own rule. They are judged as best weights are, without noise and on the
     training's evaluation fading.
 
     Args:
         configuration: of the training to come; N is its number of learners.
-        candidates: short trainings for each of its schemes and seeds.
+        candidates: short trainings for each of its mode rules and seeds.
         episodes: of each candidate.
         device: to train on.
         track: passes on the episodes one by one, as what shows the progress does.

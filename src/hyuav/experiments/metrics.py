@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.files import open_regular, read_regular, sync, write_all, write_durably
+from hyuav._support.files import open_regular, read_regular, write_all, write_durably
 from hyuav.physics.offloading import MODE_RULES
 
 METRIC_COLUMNS = (
@@ -104,7 +104,7 @@ class MetricsFile:
 
     def sync(self) -> None:
         """Return when the rows outlast a loss of power."""
-        sync(self._file)
+        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """No more rows follow."""
@@ -160,13 +160,13 @@ def read_metrics(path: Path) -> pd.DataFrame:
                 and metrics["scheme"].isin(MODE_RULES).all()
             )
         )
-        reason = "" if whole else "damaged"
+        if whole:
+            return metrics
+        reason = "damaged"
     except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else "") or "damaged"
-    if reason:
-        accepted = f"the table that a training writes ({reason})"
-        raise InputError(rejection("metrics", str(path), accepted))
-    return metrics
+        reason = getattr(error, "strerror", None) or "damaged"
+    accepted = f"the table that a training writes ({reason})"
+    raise InputError(rejection("metrics", str(path), accepted))
 
 
 def readable_metrics(path: str | Path) -> pd.DataFrame:

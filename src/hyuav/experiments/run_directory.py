@@ -1,7 +1,6 @@
 """The run directory: configuration, metrics, checkpoints, evaluation and figures of a training."""
 
 import dataclasses
-import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -16,7 +15,7 @@ from pydantic import Field
 from torch import Tensor
 
 from hyuav._support.errors import BusyError, InputError, rejection
-from hyuav._support.files import create_durably
+from hyuav._support.files import create_durably, require_writable
 from hyuav._support.parameters import checked, mapping
 from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import read_metrics
@@ -98,21 +97,6 @@ def _learners(values: object, num_slots: int) -> tuple[Learner, ...]:
         accepted = "learners that differ in scheme, seed or num_slots"
         raise InputError(rejection("learners", twice[0].to_dict(), accepted))
     return learners
-
-
-def require_writable(name: str, directory: Path) -> None:
-    """Accept a directory that can be written to; make it where there is none.
-
-    Raises:
-        InputError: it cannot be made or written to.
-    """
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=directory):
-            pass
-    except OSError as error:
-        accepted = f"a writable place ({error.strerror})"
-        raise InputError(rejection(name, str(directory), accepted)) from None
 
 
 def named_scenario(values: object) -> tuple[str, Scenario]:
@@ -201,8 +185,9 @@ class RunDirectory:
 
         Raises:
             BusyError: another process trains here.
+            InputError: it cannot be written to.
         """
-        self.path.mkdir(parents=True, exist_ok=True)
+        require_writable("run directory", self.path)
         file = self.path / LOCK_FILE
         lock = FileLock(file, timeout=0, fallback_to_soft=False)
         try:

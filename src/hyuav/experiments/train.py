@@ -7,10 +7,10 @@ from typing import Any
 from rich.console import Console
 from torch import Tensor
 
-from hyuav._support.errors import Halted, InputError
+from hyuav._support.errors import Halted, InputError, cause
 from hyuav._support.interruption import Interruption
 from hyuav._support.terminal import print_line
-from hyuav.experiments.run_directory import RunConfiguration, RunDirectory, require_writable
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, Tracker
 from hyuav.experiments.tracking.checkpoints import Reported, first_checkpoint, restore
 from hyuav.learning.training import Training
@@ -48,7 +48,6 @@ def train(
     if initial_weights is not None:
         training.warm_start(initial_weights)
     run = RunDirectory(directory)
-    require_writable("run directory", run.path)
     with run.reserved():
         RunDirectory.create(directory, configuration, request, first_checkpoint(training))
         _train(run, configuration, training, logger, console, logs)
@@ -81,12 +80,11 @@ def resume(
     """
     run = RunDirectory(directory)
     configuration = run.configuration()
-    require_writable("run directory", run.path)
     with run.reserved():
         try:
             training, reported = restore(run, lambda: configuration.new_training(device))
         except OSError as error:
-            raise Halted(f"nothing is done: {_cause(error)}") from error
+            raise Halted(f"nothing is done: {cause(error)}") from error
         rest = f"goes on after episode {training.episode} of {training.parameters.num_episodes}"
         told = "is finished" if training.is_finished else rest
         print_line(f"{run.path}: this training {told}", console)
@@ -119,16 +117,12 @@ def _train(
                     f"interrupted after episode {training.episode} of {episodes}"
                 )
         except OSError as error:
-            line = f"halted after episode {training.episode} of {episodes}: {_cause(error)}"
+            line = f"halted after episode {training.episode} of {episodes}: {cause(error)}"
             raise Halted(f"{line}; the last checkpoint is kept") from error
         interruption.raise_if_requested("interrupted after the last episode")
     if all(training.stopped):
         line = f"halted after episode {training.episode} of {episodes}: every learner has stopped"
         raise Halted(line, resumable=False)
-
-
-def _cause(error: OSError) -> str:
-    return f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror)
 
 
 def train_or_resume(

@@ -3,7 +3,7 @@
 import re
 import shlex
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -45,7 +45,10 @@ def usage(
         lines += ["", "Set by SECTION.NAME=VALUE:"]
     for section in sections:
         lines += _filled(f"  {section}".ljust(14), ", ".join(node[section]).split())
-    return "\n".join([*lines, "", *_more(call, several=node["hydra"]["run"]["dir"] != ".")])
+    lines += ["", f"{call} --cfg job: all that can be set, with its value"]
+    if node["hydra"]["run"]["dir"] != ".":
+        lines.append(f"{call} -m NAME=VALUE,VALUE: a job for each value")
+    return "\n".join([*lines, f"{call} --hydra-help: options besides"])
 
 
 def _shown(value: object) -> str:
@@ -69,11 +72,3 @@ def _filled(heading: str, words: Iterable[str]) -> list[str]:
         break_long_words=False,
         break_on_hyphens=False,
     )
-
-
-def _more(call: str, *, several: bool) -> Iterator[str]:
-    """Where the rest is told."""
-    yield f"{call} --cfg job: all that can be set, with its value"
-    if several:
-        yield f"{call} -m NAME=VALUE,VALUE: a job for each value"
-    yield f"{call} --hydra-help: options besides"

@@ -1,1 +1,1 @@
-"""Several algorithms on the same scenarios, schemes, horizons and seeds, beside the optimum."""
+"""Several algorithms on the same scenarios, mode rules, horizons and seeds, beside the optimum."""

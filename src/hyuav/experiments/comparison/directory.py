@@ -10,7 +10,7 @@ import pandas as pd
 from omegaconf import OmegaConf
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.files import create_durably
+from hyuav._support.files import create_durably, require_writable
 from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import PLAIN, Compare, parameters_of, training_episodes
@@ -18,7 +18,7 @@ from hyuav.experiments.comparison.shards import Shard
 from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.configuration import Config
 from hyuav.experiments.evaluation import EvaluationParameters
-from hyuav.experiments.run_directory import RunConfiguration, require_writable
+from hyuav.experiments.run_directory import RunConfiguration
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.learning.training import TrainingParameters

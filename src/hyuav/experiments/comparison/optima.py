@@ -17,9 +17,9 @@ from hyuav.references.optimum import FlightPolicy, solve_horizons
 
 @dataclass(frozen=True)
 class Optima:
-    """The best flight of each scheme over each horizon, in a Parquet file.
+    """The best flight of each mode rule over each horizon, in a Parquet file.
 
-    It has a row for each slot from 0: ``scheme``, ``num_slots``, ``value`` and
+    It has a row for each slot from 0: ``scheme`` (the mode rule), ``num_slots``, ``value`` and
     ``standard_error`` of the flight in bps/Hz, ``slot``, and ``x`` and ``y`` in m.
     """
 
@@ -39,7 +39,7 @@ class Optima:
             return False
         lengths = whole.groupby(["scheme", "num_slots"]).size()
         every = itertools.product(OPTIMA, self.horizons)
-        return all(lengths.get((scheme, num_slots)) == num_slots + 1 for scheme, num_slots in every)
+        return all(lengths.get((rule, num_slots)) == num_slots + 1 for rule, num_slots in every)
 
     def solve(self) -> None:
         """Find the flights and write the file."""
@@ -47,7 +47,7 @@ class Optima:
         flights = [
             pd.DataFrame(
                 {
-                    "scheme": scheme,
+                    "scheme": rule,
                     "num_slots": num_slots,
                     "value": optimum.value,
                     "standard_error": optimum.standard_error,
@@ -56,19 +56,19 @@ class Optima:
                     "y": optimum.path[:, 0, 1],
                 }
             )
-            for scheme, optima in found.items()
+            for rule, optima in found.items()
             for num_slots, optimum in optima.items()
         ]
         write_durably(self.file, pd.concat(flights, ignore_index=True).to_parquet())
 
-    def policy(self, scheme: str, num_slots: int) -> Policy:
-        """The way to fly the best flight of a scheme over a horizon.
+    def policy(self, rule: str, num_slots: int) -> Policy:
+        """The way to fly the best flight of a mode rule over a horizon.
 
         Raises:
             InputError: the file is missing or damaged.
         """
         flights = self._flights()
-        flight = flights[(flights["scheme"] == scheme) & (flights["num_slots"] == num_slots)]
+        flight = flights[(flights["scheme"] == rule) & (flights["num_slots"] == num_slots)]
         path = torch.tensor(flight.sort_values("slot")[["x", "y"]].to_numpy()).unsqueeze(1)
         return Policy(FlightPolicy(path, self.scenario))
 

@@ -1,4 +1,4 @@
-"""What a comparison covers: algorithms, scenarios, schemes, horizons and seeds."""
+"""What a comparison covers: algorithms, scenarios, mode rules, horizons and seeds."""
 
 import dataclasses
 import itertools
@@ -82,7 +82,7 @@ class Compare(Parameters):
     scheme: OneOrMore[ModeRuleName] = parameter(MODE_RULES)
     num_slots: OneOrMore[Count] = parameter((10, 20), symbol="T")
     learners: Annotated[int, Field(ge=1, le=100_000)] = parameter(10)
-    """Of each algorithm, scenario, scheme and horizon; their seeds follow ``seed``."""
+    """Of each algorithm, scenario, mode rule and horizon; their seeds follow ``seed``."""
     seed: CountOrZero = parameter(0)
     threshold: Fraction = parameter(0.97)
     """Share of the optimum that counts as solved."""

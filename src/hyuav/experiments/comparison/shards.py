@@ -88,7 +88,7 @@ class Shard:
         and the metrics are whole.
 
         Raises:
-            InputError: a scheme's optimum earns nothing, or another process trains there.
+            InputError: a mode rule's optimum earns nothing, or another process trains there.
             OSError: something cannot be written, for want of space perhaps.
         """
         self._optima(self.evaluation)
@@ -203,8 +203,8 @@ class Shard:
                 episodes.
 
         Returns:
-            ``results``, a row for each learner: ``sum_rate``, the ``optimum`` of its scheme in the
-            same episodes, and their ratio ``fraction``; ``episodes_to_threshold`` and
+            ``results``, a row for each learner: ``sum_rate``, the ``optimum`` of its mode rule in
+            the same episodes, and their ratio ``fraction``; ``episodes_to_threshold`` and
             ``seconds_to_threshold`` at the first evaluation at which the best weights so far
             earned the threshold's share of what the optimum earns in that evaluation's episodes,
             NaN where none did; ``seconds`` in all; and ``stopped``, the episode in which the
@@ -243,19 +243,19 @@ class Shard:
         return pd.DataFrame(results), pd.concat(curves, ignore_index=True)
 
     def _optima(self, episodes: EvaluationParameters) -> Mapping[str, float]:
-        """What the best flight of each of the learners' schemes earns in these episodes, in bps/Hz.
+        """What the best flight of each learner's mode rule earns in these episodes, in bps/Hz.
 
         Raises:
             InputError: one earns nothing, so that no fraction of it can be told.
         """
         scenario, optima = self.configuration.scenario, {}
-        for scheme in dict.fromkeys(own.scheme for own in self.configuration.learners):
-            policy = self.optima.policy(scheme, scenario.num_slots)
-            flights = fly(scenario, OPTIMA[scheme], policy, episodes)
-            optima[scheme] = float(flights.totals["secrecy_sum_rate"].mean())
-            if not optima[scheme]:
+        for rule in dict.fromkeys(own.scheme for own in self.configuration.learners):
+            policy = self.optima.policy(rule, scenario.num_slots)
+            flights = fly(scenario, OPTIMA[rule], policy, episodes)
+            optima[rule] = float(flights.totals["secrecy_sum_rate"].mean())
+            if not optima[rule]:
                 accepted = f"one whose optimum earns something (T = {scenario.num_slots})"
-                raise InputError(rejection("scheme", scheme, accepted))
+                raise InputError(rejection("scheme", rule, accepted))
         return optima
 
 

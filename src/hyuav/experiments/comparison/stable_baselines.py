@@ -113,10 +113,10 @@ def _train(
 
 
 def _earned(
-    scenario: Scenario, scheme: str, actor: Actor, episodes: EvaluationParameters
+    scenario: Scenario, rule: str, actor: Actor, episodes: EvaluationParameters
 ) -> tuple[float, float]:
     """Means over the episodes in bps/Hz: the secrecy sum-rate, and the reward with penalties."""
-    totals = fly(scenario, LEARNED[scheme], Policy(actor), episodes).totals
+    totals = fly(scenario, LEARNED[rule], Policy(actor), episodes).totals
     sum_rate = totals["secrecy_sum_rate"]
     reward = sum_rate - scenario.off_map_penalty * totals["off_map"]
     return float(sum_rate.mean()), float(reward.mean())

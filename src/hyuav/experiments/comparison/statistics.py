@@ -2,8 +2,8 @@
 
 As recommended by Agarwal et al., "Deep reinforcement learning at the edge of the statistical
 precipice", NeurIPS 2021. The quantity is the fraction of the optimum that a learner's best weights
-earn. A cell holds the learners of one algorithm, scenario, scheme and horizon; the learners on
-random layouts of a scheme and horizon are one cell, each layout being a draw. Intervals are 95 %
+earn. A cell holds the learners of one algorithm, scenario, mode rule and horizon; the learners on
+random layouts of a rule and horizon are one cell, each layout being a draw. Intervals are 95 %
 percentile intervals of a bootstrap that draws the learners of each cell anew.
 """
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -29,7 +29,7 @@ Checksum = Annotated[int, Field(ge=0, le=2**32 - 1)]
 class Reported:
     """How much of a training had been reported when a checkpoint was written."""
 
-    metrics: MetricsPosition = dataclasses.field(default_factory=MetricsPosition)
+    metrics: MetricsPosition = MetricsPosition()
     seconds: float = 0.0
     """Of training."""
     wandb_id: str | None = None
@@ -77,29 +77,21 @@ def restore(run: RunDirectory, begin: Callable[[], Training]) -> tuple[Training,
         OSError: the run cannot be written to.
     """
     _require_files(run)
-    without_metrics: list[_Found] = []
     reasons: list[str] = []
-    for file in (run.last_checkpoint, run.previous_checkpoint):
+    for found, has_metrics in _readable(run, reasons):
+        training = begin()
         try:
-            found = _read(file)
+            training.load_state_dict(found.state)
         except InputError as error:
-            reasons.append(f"{file.name}: {error}")
+            reasons.append(f"{found.file.name}: {error}")
             continue
-        if not found.reported.metrics.is_in(run.metrics_file):
-            without_metrics.append(found)
-            reasons.append(f"{run.metrics_file}: not what it was at the time of {file.name}")
-            continue
-        training = _resumed(found, begin, reasons)
-        if training is not None:
+        if has_metrics:
             _adopt(found, run, training, reasons)
             return training, found.reported
-    for found in without_metrics:
-        training = _resumed(found, begin, reasons)
-        if training is not None:
-            reasons.append(f"{run.metrics_file}: its damaged rows are lost")
-            _adopt(found, run, training, reasons)
-            metrics = remove_damaged_rows(run.metrics_file, training.episode)
-            return training, dataclasses.replace(found.reported, metrics=metrics)
+        reasons.append(f"{run.metrics_file}: its damaged rows are lost")
+        _adopt(found, run, training, reasons)
+        metrics = remove_damaged_rows(run.metrics_file, training.episode)
+        return training, dataclasses.replace(found.reported, metrics=metrics)
     raise InputError(reasons[0])
 
 
@@ -119,6 +111,23 @@ class _Found(NamedTuple):
     reported: Reported
 
 
+def _readable(run: RunDirectory, reasons: list[str]) -> Iterator[tuple[_Found, bool]]:
+    """The checkpoints that can be read and whether their metrics are whole; those come first."""
+    without_metrics = []
+    for file in (run.last_checkpoint, run.previous_checkpoint):
+        try:
+            found = _read(file)
+        except InputError as error:
+            reasons.append(f"{file.name}: {error}")
+            continue
+        if found.reported.metrics.is_in(run.metrics_file):
+            yield found, True
+        else:
+            reasons.append(f"{run.metrics_file}: not what it was at the time of {file.name}")
+            without_metrics.append((found, False))
+    yield from without_metrics
+
+
 def _read(file: Path) -> _Found:
     content = load_checkpoint(file, "training")
     require_entries("checkpoint", content, ("training", "reported"))
@@ -135,17 +144,6 @@ def _read(file: Path) -> _Found:
         checked(Identifier | None, "reported.wandb_id", values["wandb_id"]),
     )
     return _Found(file, content["training"], reported)
-
-
-def _resumed(found: _Found, begin: Callable[[], Training], reasons: list[str]) -> Training | None:
-    """A training of its own where the checkpoint left it; None where it does not fit, and why."""
-    training = begin()
-    try:
-        training.load_state_dict(found.state)
-    except InputError as error:
-        reasons.append(f"{found.file.name}: {error}")
-        return None
-    return training
 
 
 def _adopt(found: _Found, run: RunDirectory, training: Training, reasons: list[str]) -> None:

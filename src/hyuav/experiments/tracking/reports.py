@@ -1,7 +1,6 @@
 """What Weights & Biases gets of an evaluation and of a comparison: tables, figures, lineage."""
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -84,20 +83,13 @@ def log_comparison(
     ) as session:
         session.attempt(
             lambda run: run.summary.update(
-                {
-                    f"{row['algorithm']}/iqm": row["iqm"]
-                    for _, row in tables["algorithms"].iterrows()
-                }
+                tables["algorithms"].set_index("algorithm")["iqm"].add_suffix("/iqm").to_dict()
             )
         )
         session.attempt(
             lambda run: run.log(
-                {
-                    **{
-                        name: wandb.Table(dataframe=own) for name, own in tables.items() if len(own)
-                    },
-                    **_media(directory),
-                }
+                {name: wandb.Table(dataframe=own) for name, own in tables.items() if len(own)}
+                | _media(directory)
             )
         )
 
@@ -154,15 +146,12 @@ def _scheme_table(schemes: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
 
 def _results(schemes: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
     """Each scheme's mean secrecy sum-rate in bps/Hz and its fraction of the optimum."""
-    values = {
-        f"{scheme}/{name}": value
-        for scheme, result in schemes.items()
-        for name, value in (
-            ("secrecy_sum_rate", result["secrecy_sum_rate"]["mean"]),
-            ("fraction_of_optimum", result.get("fraction_of_optimum", math.nan)),
-        )
-    }
-    return {name: value for name, value in values.items() if math.isfinite(value)}
+    values = {}
+    for scheme, result in schemes.items():
+        values[f"{scheme}/secrecy_sum_rate"] = result["secrecy_sum_rate"]["mean"]
+        if "fraction_of_optimum" in result:
+            values[f"{scheme}/fraction_of_optimum"] = result["fraction_of_optimum"]
+    return values
 
 
 def _media(directory: Path) -> dict[str, Any]:

@@ -70,9 +70,10 @@ class Session:
         self._job_type, self._console = job_type, console
         self._memory = memory
         self._run: wandb.Run | None = None
-        self._id: str | None = logger.id
-        if memory is not None and self._id is None and logger.mode != "disabled":
-            self._id = remembered(memory).get("id")
+        self.id: str | None = logger.id
+        """Of the W&B run; None where there never was one."""
+        if memory is not None and self.id is None and logger.mode != "disabled":
+            self.id = remembered(memory).get("id")
 
     def __enter__(self) -> Self:
         if self._logger.mode != "disabled":
@@ -91,11 +92,6 @@ class Session:
         else:
             hint = f"W&B: {run.url}"
         print_line(hint, self._console)
-
-    @property
-    def id(self) -> str | None:
-        """Of the W&B run; None where there never was one."""
-        return self._id
 
     def attempt(self, action: Callable[[wandb.Run], object]) -> None:
         """Do something with the run; if that fails, say so and do nothing more with it.
@@ -173,8 +169,8 @@ class Session:
                 job_type=self._logger.job_type or self._job_type,
                 name=self._logger.name or self._directory.resolve().name,
                 tags=self._logger.tags or None,
-                id=self._id,
-                resume=None if self._id is None else "allow",
+                id=self.id,
+                resume=None if self.id is None else "allow",
                 config=dict(self._config),
                 settings=_settings(mode),
             )
@@ -193,7 +189,7 @@ class Session:
         self.attempt(self._remember)
 
     def _remember(self, run: wandb.Run) -> None:
-        self._id = run.id
+        self.id = run.id
         if self._memory is None:
             return
         identity = {

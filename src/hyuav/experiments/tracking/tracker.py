@@ -34,7 +34,7 @@ SUMMARIES = {
 
 
 def learner_names(learners: Sequence[Learner], horizons: Sequence[int]) -> list[str]:
-    """The scheme of each learner, with its horizon and seed where they tell learners apart."""
+    """The mode rule of each learner, with its horizon and seed where they tell learners apart."""
     several_horizons = len(set(horizons)) > 1
     several_seeds = len({learner.seed for learner in learners}) > 1
     return [

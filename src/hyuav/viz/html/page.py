@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.files import write_durably
-from hyuav.experiments.run_directory import REPORT_FILE, require_writable
+from hyuav._support.files import require_writable, write_durably
+from hyuav.experiments.run_directory import REPORT_FILE
 from hyuav.viz.data.comparison import is_comparison
 from hyuav.viz.html.comparison import comparison_page
 from hyuav.viz.html.document import render
