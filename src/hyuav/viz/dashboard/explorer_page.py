@@ -142,7 +142,7 @@ def _save(root: Path, scenario: Scenario) -> None:
         with refusals():
             path = drafts.save(scenario, root, name, replace=replace)
             st.success(f"Saved as {plain(path)}. To train on it:")
-            command = f"hyuav train --config-dir '{root}' scenario={name}"
+            command = f"python recipes/train.py --config-dir '{root}' scenario={name}"
             st.code(command, language="sh", wrap_lines=True)
 
 

@@ -43,7 +43,7 @@ def show(index: RunIndex) -> None:
     if not names:
         st.info(
             f"No run in {plain(index.root)} has flights or a checkpoint yet. "
-            "`hyuav evaluate run=DIRECTORY` evaluates one."
+            "`python recipes/evaluate.py run=DIRECTORY` evaluates one."
         )
         return
     if st.session_state.get("flown_run") not in names:

@@ -43,7 +43,7 @@ def show(index: RunIndex) -> None:
 def _page(index: RunIndex) -> None:
     entries = index.entries()
     if not entries:
-        st.info(f"No runs in {plain(index.root)} yet: `hyuav train` begins one.")
+        st.info(f"No runs in {plain(index.root)} yet: `python recipes/train.py` begins one.")
         return
     now = time.time()
     found = _filtered(entries, now)

@@ -43,14 +43,14 @@ def read_evaluation(directory: Path) -> dict[str, Any]:
     file = _existing(directory, EVALUATION_FILE)
     content = readable_evaluation(directory)
     if content is None:
-        raise InputError(f"{file}: expected an evaluation in JSON (hyuav evaluate makes it)")
+        raise InputError(f"{file}: expected an evaluation in JSON (recipes/evaluate.py makes it)")
     return content
 
 
 def _existing(directory: Path, name: str) -> Path:
     file = directory / name
     if not file.exists():
-        raise InputError(f"there is no {name} in {directory} (hyuav evaluate makes it)")
+        raise InputError(f"there is no {name} in {directory} (recipes/evaluate.py makes it)")
     return file
 
 
