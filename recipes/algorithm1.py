@@ -1,6 +1,7 @@
 """The paper's Algorithm 1 on one screen, from TorchRL's parts alone: copy it, and change it.
 
-python recipes/algorithm1.py
+hyuav copy algorithm1
+python algorithm1.py
 """
 
 import torch

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import gymnasium
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _ORIGINS: dict[str, tuple[str, str]] = {
     str(alias.asname): (str(line.module), alias.name)

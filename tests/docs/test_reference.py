@@ -50,7 +50,7 @@ def test_every_recipe_has_a_section_with_its_options() -> None:
     train = [row[0] for row in rows(parts["train.py"])]
     assert {"`learners`", "`warm_start`", "`num_episodes`", "`mode`"} <= set(train)
     for file, text in parts.items():
-        assert f"hyuav {file.removesuffix('.py')}" in text
+        assert re.search(rf"^hyuav (copy )?{file.removesuffix('.py')}\b", text, re.MULTILINE)
 
 
 def test_a_recipe_that_changes_a_default_shows_its_own() -> None:

@@ -36,7 +36,7 @@ class LearningCurve(NamedTuple):
     """What the learners of one scheme and horizon earned."""
 
     scheme: str
-    """A name of :data:`hyuav.experiments.evaluation.LABELS`, or an unknown one."""
+    """A name of :data:`hyuav.experiments.schemes.LABELS`, or an unknown one."""
     num_slots: int
     spacing: float
     """Episodes from a row to the next, as a median."""
@@ -81,7 +81,7 @@ def learning_curves(
 
     Args:
         metrics: rows of ``metrics.csv``, whose ``scheme`` is a mode rule as it stands there, or
-            a name of :data:`hyuav.experiments.evaluation.LABELS`. Columns may be missing.
+            a name of :data:`hyuav.experiments.schemes.LABELS`. Columns may be missing.
         quantity: the column that is drawn.
         against: the column of the horizontal axis.
     """

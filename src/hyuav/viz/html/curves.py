@@ -34,7 +34,7 @@ def learning_figure(
 
     Args:
         metrics: rows of ``metrics.csv``, whose ``scheme`` is a mode rule as it stands there, or
-            a name of :data:`hyuav.experiments.evaluation.LABELS`. May be empty.
+            a name of :data:`hyuav.experiments.schemes.LABELS`. May be empty.
         optima: what the best flight earns in bps/Hz, by mode rule.
         quantity: a column of :data:`QUANTITIES`.
     """
