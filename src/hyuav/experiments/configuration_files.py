@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
-from hydra.main import get_args_parser
 from hydra.core.config_store import ConfigStore
+from hydra.main import get_args_parser
 
 from hyuav._support.errors import InputError, brief, rejection
 from hyuav._support.yaml_files import read_yaml
