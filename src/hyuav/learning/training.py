@@ -129,14 +129,15 @@ class Training:
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
         self.scenario, self.parameters = scenario, parameters
         self.learners = tuple(learners)
-        on_cpu = as_device(device).type == "cpu"
+        device = as_device(device)
+        on_cpu = device.type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
         longest = max(self.horizons)
         if parameters.replay_size < algorithm.least_replay(longest):
             accepted = f"at least the {longest} slots of a flight, to keep the best"
             raise InputError(rejection("replay_size", parameters.replay_size, accepted))
         needs = algorithm.needed_memory(scenario, self.horizons, parameters.sizes)
-        require_memory(needs, len(self.learners), as_device(device))
+        require_memory(needs, len(self.learners), device)
         self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
         order = [index for members in self._members for index in members]
         self._order = sorted(range(len(order)), key=order.__getitem__)
