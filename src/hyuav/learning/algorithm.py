@@ -28,6 +28,7 @@ Sizes = Annotated[
     tuple[Count, ...],
     Field(min_length=1, description="the sizes of at least one hidden layer"),
 ]
+ActionScale = Annotated[float, Field(ge=1.0, le=2.0)]
 
 
 @pydantic_dataclass(frozen=True)
@@ -59,7 +60,7 @@ class AlgorithmParameters(Parameters, ABC):
     coverage_blur: PositiveNumber = parameter(0.02)
     """How wide an afterstate shows the edge of a UE's coverage, as a share of the map's side; so
     that a gradient is felt beside it."""
-    action_scale: Annotated[float, Field(ge=1.0, le=2.0)] = parameter(1.0)
+    action_scale: ActionScale = parameter(1.0)
     """Of the tanh that ends the actor; see :class:`hyuav.learning.networks.ScaledTanh`."""
 
     @abstractmethod
