@@ -28,7 +28,7 @@ def update_flops(observation_size: int, hidden_sizes: Sequence[int], batch_size:
     makes the floor a lower bound of the time.
 
     Args:
-        observation_size: U + 5.
+        observation_size: numbers of an observation.
         hidden_sizes: of both networks.
         batch_size: K.
     """

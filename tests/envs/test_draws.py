@@ -9,7 +9,7 @@ from scipy import stats
 
 from hyuav import InputError, Scenario
 from hyuav._support.randomness import GAMMA, splitmix64
-from hyuav.envs.draws import BatchDraws
+from hyuav.envs.draws import Draws
 from hyuav.envs.transforms import make_env
 from hyuav.physics.slot import Physics
 from reference import assert_same
@@ -21,7 +21,7 @@ SIMPLE = dataclasses.replace(SCENARIO, ground_to_air_k_factor=3.0, air_to_air_k_
 
 
 def drawn(seed: int = 0, batch: tuple[int, ...] = (50_000,)) -> torch.Tensor:
-    fading = BatchDraws(Physics(SIMPLE), torch.Size(batch), seed).fading()
+    fading = Draws(Physics(SIMPLE), torch.Size(batch), seed).fading()
     assert fading is not None
     return fading
 
@@ -53,7 +53,7 @@ def test_the_fading_of_every_link_follows_the_law_of_its_definition(
 
 
 def test_links_helpers_and_slots_are_drawn_independently() -> None:
-    draws = BatchDraws(Physics(SIMPLE), torch.Size((20_000, 2)), 3)
+    draws = Draws(Physics(SIMPLE), torch.Size((20_000, 2)), 3)
     powers = draws.take_fading(2)
     assert powers is not None
     correlation = torch.corrcoef(powers.permute(0, 2, 3, 1).flatten(0, 2)).fill_diagonal_(0.0)
@@ -66,7 +66,7 @@ def test_other_seeds_bring_other_numbers() -> None:
 
 
 def test_the_levels_of_the_tasks_are_uniform_and_independent_of_the_fading() -> None:
-    draws = BatchDraws(Physics(SIMPLE), torch.Size((50_000,)), 0)
+    draws = Draws(Physics(SIMPLE), torch.Size((50_000,)), 0)
     tasks, fading = draws.tasks(), draws.fading()
     low, high = SIMPLE.task_size
     level = (tasks.size[:, 3].double() - low) / (high - low)

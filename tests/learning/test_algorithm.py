@@ -10,6 +10,7 @@ from torch import Tensor
 
 from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithm import Algorithm
+from hyuav.learning.ddpg import DDPG
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.train import Cohort, Learner, update_networks, update_targets
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
@@ -97,3 +98,17 @@ def test_the_last_slot_ends_the_return_where_the_slots_are_observed(name: str, c
         trained.fly()
     ended = trained.replay[:]["next", "terminated"].flatten().tolist()
     assert ended == 2 * [False, False, False, clock]
+
+
+def test_an_actor_stays_within_the_action_box() -> None:
+    actor = DDPG(hidden_sizes=(8,), activation="relu").make_actor(1, TEN_UES)
+    data = TensorDict(observation=1e4 * torch.randn(1, 100, 15), batch_size=[1])
+    assert actor(data)["action"].abs().max() <= 1.0
+
+
+def test_an_actor_may_scale_its_tanh() -> None:
+    torch.manual_seed(0)
+    actor = DDPG(hidden_sizes=(8,), action_scale=1.1).make_actor(2, TEN_UES)
+    data = TensorDict(observation=torch.randn(2, 6, 15), batch_size=[2, 6])
+    action = (1.1 * actor.module.layers(data["observation"]).tanh()).clamp(-1.0, 1.0)
+    torch.testing.assert_close(actor(data)["action"], action)

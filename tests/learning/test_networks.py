@@ -2,18 +2,11 @@ import math
 
 import pytest
 import torch
-from tensordict import TensorDict
 from torch import nn
 
 from hyuav import Scenario
 from hyuav.learning.afterstate import Afterstate
-from hyuav.learning.networks import (
-    LearnerLinear,
-    LearnerMLP,
-    ScaledTanh,
-    make_actor,
-    make_critic,
-)
+from hyuav.learning.networks import AfterstateCritic, LearnerLinear, LearnerMLP, ScaledTanh
 
 
 def test_each_learner_has_a_layer_of_its_own() -> None:
@@ -38,18 +31,9 @@ def test_fresh_weights_have_the_distribution_of_a_linear_layer() -> None:
 
 @pytest.mark.parametrize("batch", [(), (6,), (6, 4)])
 def test_networks_take_any_batch_behind_the_learner_axis(batch: tuple[int, ...]) -> None:
-    data = TensorDict(
-        observation=torch.randn(2, *batch, 15), action=torch.randn(2, *batch, 2), batch_size=[2]
-    )
-    actor, critic = make_actor(2, 15, (8, 4), "tanh"), make_critic(2, 15, (8, 4), "tanh")
-    assert critic(data.clone())["state_action_value"].shape == (2, *batch, 1)
-    assert actor(data.clone())["action"].shape == (2, *batch, 2)
-
-
-def test_an_actor_stays_within_the_action_box() -> None:
-    actor = make_actor(1, 3, (8,), "relu")
-    data = TensorDict(observation=1e4 * torch.randn(1, 100, 3), batch_size=[1])
-    assert actor(data)["action"].abs().max() <= 1.0
+    observation, action = torch.randn(2, *batch, 15), torch.randn(2, *batch, 2)
+    assert LearnerMLP(2, 15, (8, 4), 2, "tanh")(observation).shape == (2, *batch, 2)
+    assert LearnerMLP(2, 17, (8, 4), 1, "tanh")(observation, action).shape == (2, *batch, 1)
 
 
 def test_hidden_layers_have_the_sizes_of_the_paper_by_default() -> None:
@@ -67,14 +51,6 @@ def test_a_scaled_tanh_reaches_full_speed_where_it_is_not_flat() -> None:
     torch.testing.assert_close(scaled(inputs), expected)
 
 
-def test_an_actor_may_scale_its_tanh() -> None:
-    torch.manual_seed(0)
-    actor = make_actor(2, 15, (8,), "tanh", scale=1.1)
-    data = TensorDict(observation=torch.randn(2, 6, 15), batch_size=[2, 6])
-    action = (1.1 * actor.module.layers(data["observation"]).tanh()).clamp(-1.0, 1.0)
-    torch.testing.assert_close(actor(data)["action"], action)
-
-
 def test_normalized_layers_do_not_depend_on_the_scale_of_their_inputs() -> None:
     network = LearnerMLP(1, 3, (8,), 1, "tanh", layer_norm=True)
     network.get_parameter("layers.0.bias").data.zero_()
@@ -85,7 +61,7 @@ def test_normalized_layers_do_not_depend_on_the_scale_of_their_inputs() -> None:
 def test_a_critic_counts_of_each_ue_what_is_covered() -> None:
     scenario = Scenario.preset("two_clusters")
     afterstate = Afterstate(scenario, 0.02, clock=False, geofence=False)
-    critic = make_critic(1, 15, (8,), "tanh", afterstate=afterstate).module
+    critic = AfterstateCritic(afterstate, LearnerMLP(1, afterstate.size, (8,), 11, "tanh"))
     for weight in critic.network.parameters():
         weight.data.zero_()
     worth = torch.tensor([0.5, *range(1, 11)])  # always, then of each UE

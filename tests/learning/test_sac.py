@@ -4,7 +4,6 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.objectives import SACLoss, ValueEstimators
 
 from batches import TEN_UES, mini_batch
-from hyuav.learning.networks import make_critic
 from hyuav.learning.sac import SAC
 from hyuav.learning.train import update_networks
 
@@ -25,7 +24,7 @@ def test_with_one_learner_the_losses_are_torchrls() -> None:
     ours = SAC(hidden_sizes=(8,), temperature_init=0.3).build(1, TEN_UES)
     theirs = SACLoss(
         ours.explorer,
-        make_critic(1, 15, (8,), "tanh"),
+        SAC(hidden_sizes=(8,)).make_critic(1, TEN_UES),
         alpha_init=0.3,
         target_entropy=-2.0,
         loss_function="l2",

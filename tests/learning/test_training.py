@@ -11,7 +11,7 @@ from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.learning.weights import copy_weights, select_learner
+from hyuav.learning.weights import copy_weights, join_learners, select_learners
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 SHORT = TrainingParameters(
@@ -38,8 +38,8 @@ def seeds(*numbers: int, scheme: str = "hybrid") -> tuple[Learner, ...]:
 
 
 def weights(trained: Training, learner: int) -> dict[str, torch.Tensor]:
-    joined = trained._join([copy_weights(cohort.algorithm.loss) for cohort in trained.cohorts])
-    return select_learner(joined, learner)
+    joined = join_learners([copy_weights(cohort.algorithm.loss) for cohort in trained.cohorts])
+    return select_learners(joined, [trained._order[learner]])
 
 
 def test_there_is_one_update_after_every_slot_once_a_mini_batch_is_stored() -> None:
@@ -72,7 +72,7 @@ def test_the_best_weights_are_those_of_the_best_evaluation() -> None:
         best = torch.maximum(best, episode.evaluation.reward)
         assert torch.equal(trained.best_evaluation, best)
     for learner, own in enumerate(kept):
-        best_weights = select_learner(trained.best_weights, learner)
+        best_weights = select_learners(trained.best_weights, [learner])
         assert all(torch.equal(best_weights[name], own[name]) for name in own)
 
 
@@ -169,15 +169,15 @@ def test_a_warm_start_begins_with_the_earlier_networks_and_targets() -> None:
     later = training(learners=seeds(8, 9))
     later.warm_start(earlier.best_weights)
     for learner in range(2):
-        own, best = weights(later, learner), select_learner(later.best_weights, learner)
-        before = select_learner(earlier.best_weights, learner)
+        own, best = weights(later, learner), select_learners(later.best_weights, [learner])
+        before = select_learners(earlier.best_weights, [learner])
         assert all(torch.equal(own[key], before[key]) for key in own)
         assert all(torch.equal(best[key], before[key]) for key in own)
     three = training(learners=seeds(1, 2, 3)).best_weights
     for cohorts in (1, 2):
         with pytest.raises(InputError, match="it holds 3 learners: expected 6 learners, or one"):
             training(learners=seeds(*range(6)), cohorts=cohorts).warm_start(three)
-    later.warm_start(select_learner(earlier.best_weights, 1))
+    later.warm_start(select_learners(earlier.best_weights, [1]))
     assert all(
         torch.equal(values, weights(later, 1)[key]) for key, values in weights(later, 0).items()
     )

@@ -15,7 +15,7 @@ from hyuav.learning.weights import (
     join_learners,
     load_weights,
     replace_learners,
-    select_learner,
+    select_learners,
 )
 
 NINE_UES = dataclasses.replace(TEN_UES, ue_positions=TEN_UES.ue_positions[1:])
@@ -25,7 +25,7 @@ NINE_UES = dataclasses.replace(TEN_UES, ue_positions=TEN_UES.ue_positions[1:])
 def test_a_selected_learner_acts_as_it_does_among_others(name: str) -> None:
     many = ALGORITHMS[name](clock=False, hidden_sizes=(8,)).build(3, TEN_UES)
     one = ALGORITHMS[name](clock=False, hidden_sizes=(8,)).build(1, TEN_UES)
-    load_weights(one.loss, select_learner(copy_weights(many.loss), 1))
+    load_weights(one.loss, select_learners(copy_weights(many.loss), [1]))
     data = TensorDict(observation=torch.randn(3, 6, 15), batch_size=[3, 6])
     expected = many.actor(data.clone())["action"][1:2]
     torch.testing.assert_close(one.actor(data[1:2].clone())["action"], expected)
@@ -83,7 +83,7 @@ def test_initial_weights_are_a_learners_own_and_follow_pytorchs_law(name: str) -
     draw_weights(many.loss, [4, 7, 5], "weights")
     draw_weights(one.loss, [7], "weights")
     weights, alone = copy_weights(many.loss), copy_weights(one.loss)
-    selected = select_learner(weights, 1)
+    selected = select_learners(weights, [1])
     assert all(torch.equal(alone[key], selected[key]) for key in alone)
     for key, values in weights.items():
         if key.endswith("layers.2.weight"):
@@ -102,5 +102,5 @@ def test_joined_learners_are_counted_and_selected_again() -> None:
     several = [copy_weights(DDPG(hidden_sizes=(8,)).build(n, TEN_UES).loss) for n in (1, 2)]
     joined = join_learners(several)
     assert [count_learners(each) for each in (*several, joined)] == [1, 2, 3]
-    last = select_learner(joined, 2)
-    assert all(torch.equal(last[key], select_learner(several[1], 1)[key]) for key in last)
+    last = select_learners(joined, [2])
+    assert all(torch.equal(last[key], select_learners(several[1], [1])[key]) for key in last)

@@ -1,6 +1,7 @@
 """What the environments accept as arguments, and how they answer anything else."""
 
 import dataclasses
+import operator
 from collections.abc import Sequence
 
 import torch
@@ -102,12 +103,12 @@ def as_seed(seed: int | None) -> int:
     if seed is None:
         return int(torch.randint(2**62, ()))
     accepted = "a whole number in [0, 2^63)"
-    if isinstance(seed, bool) or not hasattr(seed, "__index__"):
-        raise InputTypeError(rejection("seed", seed, accepted))
     try:
-        number = seed.__index__()
+        number = operator.index(seed)
     except TypeError:
         raise InputTypeError(rejection("seed", seed, accepted)) from None
+    if isinstance(seed, bool):
+        raise InputTypeError(rejection("seed", seed, accepted))
     if not 0 <= number < 2**63:
         raise InputError(rejection("seed", seed, accepted))
     return number

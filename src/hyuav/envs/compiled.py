@@ -57,11 +57,10 @@ class CompiledEnv(TransformedEnv):
         return after
 
     def set_seed(self, seed: int | None = None, static_seed: bool = False) -> int | None:
-        """Seed the draws; those of one seed for all and of one per row differ in shape."""
-        before = type(self.base_env.draws)
-        following: int | None = super().set_seed(seed, static_seed)
-        if type(self.base_env.draws) is not before:
+        """Draw from one seed for all rows; a graph that draws from one for each is then dropped."""
+        if self.base_env.draws.rows is not None:
             self._flight = None
+        following: int | None = super().set_seed(seed, static_seed)
         return following
 
     def _flown(self, flight: Flight, tensordict: TensorDictBase) -> TensorDictBase:

@@ -24,15 +24,27 @@ class Draws:
     them. Each number depends on its seed and its place alone: slot, row and link or task. So it
     does not matter how many are drawn at once, and devices differ only in rounding.
 
+    Where there is a seed for each row of the batch's first dimension, a row's numbers depend on its
+    own seed alone. So rows of equal seeds fly through the same fading and a row keeps its numbers
+    whatever other rows there are.
+
     Args:
         physics: whose fading and tasks are drawn.
-        seeds: of D groups of helpers.
-        inner: shape of each group.
+        batch_size: of the helpers flown at once.
+        seed: of all numbers, or one for each row.
     """
 
-    def __init__(self, physics: Physics, seeds: Sequence[int], inner: torch.Size) -> None:
-        self._physics, self._rank = physics, 1 + len(inner)
-        keys = [[derived_seed(seed, name) for seed in seeds] for name in NAMES]
+    def __init__(self, physics: Physics, batch_size: torch.Size, seed: int | Sequence[int]) -> None:
+        self._physics = physics
+        self.rows: Tensor | None = None
+        """Which of the distinct seeds each row has; None where one seed is for all."""
+        if isinstance(seed, int):
+            seeds, inner = [seed], batch_size
+        else:
+            seeds, inner = list(dict.fromkeys(seed)), batch_size[1:]
+            self.rows = self._tensor([seeds.index(own) for own in seed])
+        self._rank = 1 + len(inner)
+        keys = [[derived_seed(own, name) for own in seeds] for name in NAMES]
         self._keys = self._tensor(keys).reshape(len(NAMES), len(seeds), *(1 for _ in inner))
         widths, device = (physics.link_row.size, 2 * physics.scenario.num_ues), physics.device
         per_slot = len(seeds) * inner.numel() * widths[0]
@@ -86,14 +98,22 @@ class Draws:
         return {"keys": self._keys.cpu(), **self._slots}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Continue where :meth:`state` was taken from draws of as many groups."""
+        """Continue where :meth:`state` was taken from draws of as many distinct seeds."""
         self._keys = state["keys"].to(self._keys.device).reshape(self._keys.shape)
         self._slots = {name: int(state[name]) for name in NAMES}
         self._blocks.clear()
 
     def _spread(self, numbers: Tensor) -> Tensor:
-        """From the numbers of groups (..., D, *inner, k) to the batch's (..., *batch_size, k)."""
-        raise NotImplementedError
+        """From the numbers of D seeds (..., D, *inner, k) to the batch's (..., *batch_size, k)."""
+        axis = numbers.ndim - 1 - self._rank
+        if self.rows is None:
+            return numbers.squeeze(axis)
+        seeds, rows = numbers.shape[axis], len(self.rows)
+        if seeds == rows:
+            return numbers
+        if seeds == 1:  # the same memory for all rows
+            return numbers.expand(*numbers.shape[:axis], rows, *numbers.shape[axis + 1 :])
+        return numbers.index_select(axis, self.rows)
 
     def _next(self, name: str) -> Tensor:
         """The next slot's numbers, several slots of which are drawn at once."""
@@ -128,51 +148,6 @@ class Draws:
 
     def _as_tasks(self, levels: Tensor) -> Tasks:
         return tasks_at(self._physics.scenario, *levels.chunk(2, dim=-1))
-
-
-class BatchDraws(Draws):
-    """One seed for the whole batch.
-
-    Args:
-        physics: whose fading and tasks are drawn.
-        batch_size: of the helpers flown at once.
-        seed: of all numbers.
-    """
-
-    def __init__(self, physics: Physics, batch_size: torch.Size, seed: int) -> None:
-        super().__init__(physics, [seed], batch_size)
-
-    def _spread(self, numbers: Tensor) -> Tensor:
-        return numbers.squeeze(-1 - self._rank)
-
-
-class RowDraws(Draws):
-    """A seed for each row of the batch's first dimension.
-
-    A row's numbers depend on its own seed alone, so rows of equal seeds fly through the same
-    fading and a row keeps its numbers whatever other rows there are.
-
-    Args:
-        physics: whose fading and tasks are drawn.
-        batch_size: of the helpers flown at once, of at least one dimension.
-        seeds: of the rows.
-    """
-
-    def __init__(self, physics: Physics, batch_size: torch.Size, seeds: Sequence[int]) -> None:
-        distinct = list(dict.fromkeys(seeds))
-        super().__init__(physics, distinct, batch_size[1:])
-        self._rows = torch.tensor([distinct.index(seed) for seed in seeds], device=physics.device)
-
-    def _spread(self, numbers: Tensor) -> Tensor:
-        axis = numbers.ndim - 1 - self._rank
-        groups = numbers.shape[axis]
-        if groups == len(self._rows):
-            return numbers
-        if groups == 1:  # the same memory for all rows
-            return numbers.expand(
-                *numbers.shape[:axis], len(self._rows), *numbers.shape[axis + 1 :]
-            )
-        return numbers.index_select(axis, self._rows)
 
 
 class GivenDraws:

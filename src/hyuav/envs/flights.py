@@ -91,7 +91,7 @@ class Flights:
         return _column(after["reward"]), _column(sum_rate), _column(after["truncated"])
 
     def observation(self) -> Floats:
-        """The normalized observation: (*B, U + 5)."""
+        """The normalized observation: (*B, observed)."""
         return self.state["observation"].numpy(force=True)
 
     def info(self, secrecy_sum_rate: Floats) -> dict[str, NDArray[Any]]:

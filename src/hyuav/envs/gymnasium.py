@@ -11,6 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from hyuav._support.errors import InputError, rejection
+from hyuav._support.parameters import Count, checked
 from hyuav.envs.arguments import as_seed
 from hyuav.envs.flights import RENDERING, Flags, Flights, Floats, accepted_options
 from hyuav.envs.transforms import make_env
@@ -148,8 +149,7 @@ class SecureOffloadingVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         device: torch.device | str | None = None,
         render_mode: str | None = None,
     ) -> None:
-        if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
-            raise InputError(rejection("num_envs", num_envs, "a whole number >= 1"))
+        num_envs = checked(Count, "num_envs", num_envs)
         seed = int(self.np_random.integers(2**63))
         env = make_env(scenario, scheme, num_envs, device, seed, clock=clock, geofence=geofence)
         self._flights = Flights(env, render_mode)

@@ -21,7 +21,7 @@ from hyuav.envs.arguments import (
     require_shape,
 )
 from hyuav.envs.diagnostics import diagnose, diagnostics_spec
-from hyuav.envs.draws import BatchDraws, Draws, RowDraws
+from hyuav.envs.draws import Draws
 from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import ModeRule
 from hyuav.physics.scenario import Scenario
@@ -108,7 +108,7 @@ class SecureOffloadingEnv(EnvBase):
         self._make_specs()
         self.draws: Draws
         if isinstance(seed, list | tuple):
-            self.draws = RowDraws(self.physics, self.batch_size, as_seeds(seed, self.batch_size))
+            self.draws = Draws(self.physics, self.batch_size, as_seeds(seed, self.batch_size))
         else:
             self.set_seed(as_seed(seed))
 
@@ -175,7 +175,7 @@ class SecureOffloadingEnv(EnvBase):
         self.done_spec = Composite(done=flags(1), terminated=flags(1), shape=batch, device=device)
 
     def _set_seed(self, seed: int | None) -> None:
-        self.draws = BatchDraws(self.physics, self.batch_size, as_seed(seed))
+        self.draws = Draws(self.physics, self.batch_size, as_seed(seed))
 
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
         position = self.start(tensordict)

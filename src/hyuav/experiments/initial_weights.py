@@ -11,7 +11,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.learning.checkpoint import load_weights_file
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Episode, Training
-from hyuav.learning.weights import join_learners, select_learner
+from hyuav.learning.weights import select_learners
 
 
 def saved_weights(path: str | Path) -> dict[str, Tensor]:
@@ -75,6 +75,6 @@ def select_initial_weights(
     for learner in learners:
         own = torch.tensor([owner == learner.seed for owner in owners])
         reached = earned[learner.scheme].where(own, -torch.inf)
-        chosen.append(select_learner(weights, int(reached.argmax())))
+        chosen.append(int(reached.argmax()))
         best.append(float(reached.max()))
-    return join_learners(chosen), best
+    return select_learners(weights, chosen), best

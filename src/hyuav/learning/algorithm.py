@@ -20,7 +20,7 @@ from hyuav._support.randomness import RowStream
 from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.memory import Need, needed_for_networks
-from hyuav.learning.networks import ACTIVATIONS, make_actor, make_critic
+from hyuav.learning.networks import ACTIVATIONS, AfterstateCritic, LearnerMLP, ScaledTanh
 from hyuav.learning.replay import FADING, TransitionOptions
 from hyuav.physics.scenario import Scenario
 
@@ -28,6 +28,7 @@ Sizes = Annotated[
     tuple[Count, ...],
     Field(min_length=1, description="the sizes of at least one hidden layer"),
 ]
+ActionScale = Annotated[float, Field(ge=1.0, le=2.0)]
 
 
 @pydantic_dataclass(frozen=True)
@@ -59,7 +60,7 @@ class AlgorithmParameters(Parameters, ABC):
     coverage_blur: PositiveNumber = parameter(0.02)
     """How wide an afterstate shows the edge of a UE's coverage, as a share of the map's side; so
     that a gradient is felt beside it."""
-    action_scale: Annotated[float, Field(ge=1.0, le=2.0)] = parameter(1.0)
+    action_scale: ActionScale = parameter(1.0)
     """Of the tanh that ends the actor; see :class:`hyuav.learning.networks.ScaledTanh`."""
 
     @abstractmethod
@@ -115,21 +116,38 @@ class AlgorithmParameters(Parameters, ABC):
         return ObservationLayout(scenario, clock=self.clock).size
 
     def make_actor(self, learners: int, scenario: Scenario) -> TensorDictModule:
-        """mu(s) of N learners, as :func:`hyuav.learning.networks.make_actor` describes it."""
-        size = self.observation_size(scenario)
-        return make_actor(
-            learners, size, self.hidden_sizes, self.activation, scale=self.action_scale
-        )
+        """mu(s) of N learners.
+
+        Reads ``observation`` (N, ..., observed), writes ``action`` (N, ..., 2) in [-1, 1].
+        """
+        size, scale = self.observation_size(scenario), self.action_scale
+        output = ScaledTanh(scale) if scale > 1.0 else nn.Tanh()
+        network = LearnerMLP(learners, size, self.hidden_sizes, 2, self.activation, output)
+        return TensorDictModule(network, in_keys=["observation"], out_keys=["action"])
 
     def make_critic(self, learners: int, scenario: Scenario) -> TensorDictModule:
-        """Q(s, a) of N learners, as :func:`hyuav.learning.networks.make_critic` describes it."""
-        return make_critic(
+        """Q(s, a) of N learners.
+
+        Reads ``observation`` (N, ..., observed) and ``action`` (N, ..., 2), writes
+        ``state_action_value`` (N, ..., 1).
+        """
+        afterstate = self.make_afterstate(scenario, self.geofence) if self.afterstate else None
+        if afterstate is None:
+            inputs, outputs = self.observation_size(scenario) + 2, 1
+        else:
+            inputs, outputs = afterstate.size, 1 + afterstate.num_ues
+        network = LearnerMLP(
             learners,
-            self.observation_size(scenario),
+            inputs,
             self.hidden_sizes,
+            outputs,
             self.activation,
             layer_norm=self.layer_norm,
-            afterstate=self.make_afterstate(scenario, self.geofence) if self.afterstate else None,
+        )
+        return TensorDictModule(
+            network if afterstate is None else AfterstateCritic(afterstate, network),
+            in_keys=["observation", "action"],
+            out_keys=["state_action_value"],
         )
 
     def make_afterstate(self, scenario: Scenario, geofence: bool) -> Afterstate:
@@ -166,8 +184,6 @@ class Guidance(nn.Module):
 
     streams: Mapping[str, RowStream] = {}
     """Of the random numbers that it draws, by name."""
-    plans: bool = False
-    """Whether it ever has a plan."""
 
     def plan(self, episode: int) -> Tensor | None:  # noqa: ARG002
         """Actions (T, N, 2) to execute in an episode, from 1, whatever the explorer says.
@@ -209,7 +225,7 @@ class Algorithm:
     """The parts of an algorithm for N learners, ready to train."""
 
     actor: TensorDictModuleBase
-    """mu: writes the noise-free ``action`` (N, ..., 2) from ``observation`` (N, ..., U + 5)."""
+    """mu: writes the noise-free ``action`` (N, ..., 2) from ``observation``."""
     explorer: TensorDictModuleBase
     """Writes the ``action`` to take in training."""
     loss: LossModule

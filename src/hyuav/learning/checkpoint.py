@@ -55,24 +55,23 @@ def load_checkpoint(path: str | Path, kind: str, device: torch.device | str = "c
         InputError: no such file, a truncated, damaged or foreign one, one of another kind, or what
             is there is no file but a pipe or a device.
     """
-    accepted = f"a checkpoint of kind {kind!r} written by hyuav"
     try:
         stored = _load(Path(path), device)
     except OSError as error:
         reason = error.strerror or type(error).__name__
-        raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})")) from None
     except Exception:  # what unpickling raises on a foreign file is up to its bytes
         reason = "not a checkpoint, truncated or damaged"
-        raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})")) from None
-    if isinstance(stored, dict) and stored.get("format") in EARLIER_FORMATS:
-        reason = "this one is of an earlier version and cannot be continued"
-        raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})"))
-    if not isinstance(stored, dict) or stored.get("format") != FORMAT:
-        raise InputError(rejection("checkpoint", str(path), f"{accepted} (another program's)"))
-    if stored.get("kind") != kind:
-        reason = f"this one is of kind {brief(stored.get('kind'))}"
-        raise InputError(rejection("checkpoint", str(path), f"{accepted} ({reason})"))
-    return stored.get("content")
+    else:
+        if isinstance(stored, dict) and stored.get("format") in EARLIER_FORMATS:
+            reason = "this one is of an earlier version and cannot be continued"
+        elif not isinstance(stored, dict) or stored.get("format") != FORMAT:
+            reason = "another program's"
+        elif stored.get("kind") != kind:
+            reason = f"this one is of kind {brief(stored.get('kind'))}"
+        else:
+            return stored.get("content")
+    accepted = f"a checkpoint of kind {kind!r} written by hyuav ({reason})"
+    raise InputError(rejection("checkpoint", str(path), accepted))
 
 
 def _load(path: Path, device: torch.device | str) -> Any:

@@ -53,6 +53,9 @@ class CompiledSlots:
         transitions: what is kept of each slot.
         replay: whose slots are changed.
         stored: those, (capacity, N).
+        streams: of random numbers: ``exploration`` (N, n, 2), standard normal, where the
+            explorer draws n times; ``sampling`` (N, K), uniform; ``losses`` (N, n, K, 2),
+            standard normal, where the losses draw n times. The environment has its own.
         observed: what the helpers observe, (N,); an example.
 
     Raises:
@@ -66,9 +69,10 @@ class CompiledSlots:
         transitions: TransitionOptions,
         replay: ReplayBuffer,
         stored: TensorDictBase,
+        streams: Mapping[str, RowStream],
         observed: TensorDictBase,
     ) -> None:
-        self._env, self._algorithm = env, algorithm
+        self._env, self._algorithm, self._streams = env, algorithm, streams
         self._transitions, self._replay, self._stored = transitions, replay, stored
         self._observed = observed.clone()
         self._adam = {step.name: AdamState(step) for step in algorithm.steps}
@@ -86,17 +90,17 @@ class CompiledSlots:
             name: torch.zeros(learners, device=device) for name in ("reward", *self._adam)
         }
         self._finite = torch.zeros(learners, dtype=torch.int64, device=device)
-        examples = self._examples(replay.batch_size)
-        self._names = tuple(examples)
+        no_slots = self._inputs(algorithm.guide.plan(episode=1), 0, 0)
+        self._names = tuple(no_slots)
+        examples = [each.new_zeros(each.shape[1:]) for each in no_slots.values()]
         self._programs = {
-            taken: compile_function(functools.partial(self._slot, taken), [*examples.values()])
+            taken: compile_function(functools.partial(self._slot, taken), examples)
             for taken in algorithm.all_due
         }
 
     def fly(
         self,
         observed: TensorDictBase,
-        streams: Mapping[str, RowStream],
         plan: Tensor | None,
         slots: int,
         updates: int,
@@ -105,22 +109,15 @@ class CompiledSlots:
 
         Args:
             observed: what the helpers observe before the first slot, (N,); left as it is.
-            streams: of random numbers: ``exploration`` (N, n, 2), standard normal, where the
-                explorer draws n times; ``sampling`` (N, K), uniform; ``losses`` (N, n, K, 2),
-                standard normal, where the losses draw n times. The environment has its own.
             plan: see :meth:`hyuav.learning.algorithm.Guidance.plan`.
             slots: how many.
             updates: taken before.
         """
         self._begin(observed)
         counts = dict.fromkeys(self._adam, 0)
-        draws = self._draws(streams, slots)
-        blocks = {**draws, "corrections": self._corrections(updates, slots)}
-        if plan is not None:
-            blocks["plan"] = plan
+        blocks = self._inputs(plan, slots, updates)
         with torch.no_grad():
-            rows = zip(*(blocks[name] for name in self._names), strict=True)
-            for slot, inputs in enumerate(rows):
+            for slot, inputs in enumerate(zip(*blocks.values(), strict=True)):
                 taken = self._algorithm.due(updates + slot + 1)
                 self._programs[taken](*inputs)
                 for name, due in zip(counts, taken, strict=False):
@@ -129,10 +126,16 @@ class CompiledSlots:
         losses = {name: self._totals[name] / count for name, count in counts.items() if count}
         return FlownEpisode(self._totals["reward"].clone(), losses, self._finite.clone())
 
-    def _draws(self, streams: Mapping[str, RowStream], slots: int) -> dict[str, Tensor]:
-        """The random numbers of all slots, a slot in each row."""
+    def _inputs(self, plan: Tensor | None, slots: int, updates: int) -> dict[str, Tensor]:
+        """What differs from slot to slot, a slot in each row: random numbers, Adam's corrections.
+
+        With no slots, they tell the shapes.
+        """
         env = self._env.base_env
-        blocks = {name: stream.take(slots) for name, stream in streams.items()}
+        blocks = {name: stream.take(slots) for name, stream in self._streams.items()}
+        blocks["corrections"] = self._corrections(updates, slots)
+        if plan is not None:
+            blocks["plan"] = plan[:slots]
         if env.scenario.fading:
             blocks["fading"] = env.draws.take_fading(slots).contiguous()  # where rows are shared
         if env.physics.edge_can_saturate:
@@ -163,25 +166,6 @@ class CompiledSlots:
         powers = torch.tensor(betas, **exact) ** (index // every).unsqueeze(-1)
         first, second = (1.0 / (1.0 - powers)).unbind(dim=-1)
         return torch.stack([first, second.sqrt()], dim=-1).float()
-
-    def _examples(self, batch_size: int) -> dict[str, Tensor]:
-        """Tensors of the shapes in which a slot's random numbers come."""
-        learners, device = self._env.batch_size[0], self._env.device
-        physics, normals = self._env.base_env.physics, self._algorithm.loss_normals
-        shapes: dict[str, tuple[int, ...]] = {
-            "exploration": (learners, self._algorithm.explorer_normals, 2),
-            "sampling": (learners, batch_size),
-            "corrections": (len(self._adam), 2),
-        }
-        if self._algorithm.guide.plans:
-            shapes["plan"] = (learners, 2)
-        if normals:
-            shapes["losses"] = (learners, normals, batch_size, 2)
-        if physics.scenario.fading:
-            shapes["fading"] = (learners, physics.link_row.size)
-        if physics.edge_can_saturate:
-            shapes["tasks"] = (learners, 2, physics.scenario.num_ues)
-        return {name: torch.zeros(shape, device=device) for name, shape in shapes.items()}
 
     @torch.no_grad()
     def _slot(self, taken: tuple[bool, ...], *inputs: Tensor) -> None:

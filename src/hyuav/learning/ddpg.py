@@ -12,14 +12,17 @@ from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, GradientSte
 from hyuav.learning.exploration import GaussianNoise
 from hyuav.physics.scenario import Scenario
 
+NoiseVariance = Annotated[float, Field(ge=0.0, le=1e6)]
+SlotOrEpisode = Annotated[str, OneOf("slot", "episode")]
+
 
 @dataclass(frozen=True)
 class DDPG(AlgorithmParameters):
     """The paper's hyperparameters; the noise is in units of v_max."""
 
-    noise_variance: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(0.6)
+    noise_variance: NoiseVariance = parameter(0.6)
     noise_decay: Fraction = parameter(0.999)
-    noise_decay_per: Annotated[str, OneOf("slot", "episode")] = parameter("slot")
+    noise_decay_per: SlotOrEpisode = parameter("slot")
 
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""

@@ -5,7 +5,6 @@ import math
 from collections.abc import Sequence
 
 import torch
-from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
 
 from hyuav.learning.afterstate import Afterstate
@@ -128,56 +127,9 @@ class AfterstateCritic(nn.Module):
         self.afterstate, self.network = afterstate, network
 
     def forward(self, observation: Tensor, action: Tensor) -> Tensor:
-        """Map observations (N, ..., U + 5) and actions (N, ..., 2) to values (N, ..., 1)."""
+        """Map observations (N, ..., observed) and actions (N, ..., 2) to values (N, ..., 1)."""
         features = self.afterstate(observation, action)
         always, of_each_ue = self.network(features).tensor_split([1], dim=-1)
         covered = self.afterstate.coverage(features)
         values: Tensor = always + (covered * of_each_ue).sum(dim=-1, keepdim=True)
         return values
-
-
-def make_critic(
-    learners: int,
-    observation_size: int,
-    hidden_sizes: Sequence[int],
-    activation: str,
-    *,
-    layer_norm: bool = False,
-    afterstate: Afterstate | None = None,
-) -> TensorDictModule:
-    """Q(s, a) of N learners.
-
-    Reads ``observation`` (N, ..., U + 5) and ``action`` (N, ..., 2), writes
-    ``state_action_value`` (N, ..., 1). With an afterstate, its features are what the networks see.
-    """
-    if afterstate is None:
-        inputs, outputs = observation_size + 2, 1
-    else:
-        inputs, outputs = afterstate.size, 1 + afterstate.num_ues
-    network = LearnerMLP(learners, inputs, hidden_sizes, outputs, activation, layer_norm=layer_norm)
-    return TensorDictModule(
-        network if afterstate is None else AfterstateCritic(afterstate, network),
-        in_keys=["observation", "action"],
-        out_keys=["state_action_value"],
-    )
-
-
-def make_actor(
-    learners: int,
-    observation_size: int,
-    hidden_sizes: Sequence[int],
-    activation: str,
-    *,
-    scale: float = 1.0,
-) -> TensorDictModule:
-    """mu(s) of N learners.
-
-    Reads ``observation`` (N, ..., U + 5), writes ``action`` (N, ..., 2) in [-1, 1] by a tanh,
-    which may be scaled.
-    """
-    output = ScaledTanh(scale) if scale > 1.0 else nn.Tanh()
-    return TensorDictModule(
-        LearnerMLP(learners, observation_size, hidden_sizes, 2, activation, output),
-        in_keys=["observation"],
-        out_keys=["action"],
-    )

@@ -11,7 +11,7 @@ from torchrl.envs import TransformedEnv
 
 from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
-from hyuav.learning.weights import join_learners, load_weights, select_learner
+from hyuav.learning.weights import load_weights, select_learners
 from hyuav.physics.scenario import Scenario
 
 
@@ -84,12 +84,12 @@ class LearnedPolicy(TensorDictModuleBase):
         self._several = not isinstance(learner, int)
         learners = [learner] if isinstance(learner, int) else learner
         built = algorithm.build(len(learners), scenario)
-        load_weights(built.loss, join_learners([select_learner(weights, i) for i in learners]))
+        load_weights(built.loss, select_learners(weights, learners))
         self.actor = built.actor
 
     @torch.no_grad()
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Read ``observation`` (..., U + 5), write ``action`` (..., 2) in [-1, 1]."""
+        """Read ``observation`` (..., observed), write ``action`` (..., 2) in [-1, 1]."""
         observed = tensordict.select("observation")
         if self._several:
             tensordict["action"] = self.actor(observed)["action"]

@@ -22,14 +22,17 @@ from hyuav.learning.networks import LearnerMLP, ScaledTanh
 from hyuav.learning.torchrl_internals import LearnerSACLoss
 from hyuav.physics.scenario import Scenario
 
+Temperature = Annotated[float, Field(ge=1e-6, le=1e6)]
+Entropy = Annotated[float, Field(ge=-100.0, le=100.0)]
+
 
 @dataclass(frozen=True)
 class SAC(AlgorithmParameters):
     """SAC's hyperparameters beside the common ones; the target entropy is minus dim(a)."""
 
     temperature_learning_rate: Fraction = parameter(3e-4)
-    temperature_init: Annotated[float, Field(ge=1e-6, le=1e6)] = parameter(0.2)
-    target_entropy: Annotated[float, Field(ge=-100.0, le=100.0)] = parameter(-2.0)
+    temperature_init: Temperature = parameter(0.2)
+    target_entropy: Entropy = parameter(-2.0)
 
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import torch
@@ -162,7 +163,8 @@ class Cohort:
             if len(self.replay) >= self.replay.batch_size:
                 batch = self.replay.sample()  # line 13
                 self.updates += 1
-                losses[-1] = self._update_networks(batch)  # line 14
+                with self._given("losses"):
+                    losses[-1] = update_networks(self.algorithm, batch, self.updates)  # line 14
                 update_targets(self.algorithm, self.updates)  # line 15
             reward += slot["next", "reward"].squeeze(-1)
             unbroken &= all_finite((reward, *losses[-1].values()))
@@ -171,17 +173,17 @@ class Cohort:
 
     def _explore(self, observed: TensorDictBase) -> TensorDictBase:
         """Line 5: the action of the actor, and noise; or what a guide has planned."""
-        with given_normals(iter(next(self._streams["exploration"]).unbind(dim=1))):
+        with self._given("exploration"):
             acted = self.algorithm.explorer(observed)
         if self._plan is None:
             return acted
         return as_planned(acted, self._plan[int(acted["step_count"][0])])
 
-    def _update_networks(self, batch: TensorDictBase) -> dict[str, Tensor]:
-        if "losses" not in self._streams:
-            return update_networks(self.algorithm, batch, self.updates)
-        with given_normals(iter(next(self._streams["losses"]).unbind(dim=1))):
-            return update_networks(self.algorithm, batch, self.updates)
+    def _given(self, name: str) -> AbstractContextManager[None]:
+        """Inside it, normal numbers are drawn from the next of a stream, where there is one."""
+        if name not in self._streams:
+            return nullcontext()
+        return given_normals(iter(next(self._streams[name]).unbind(dim=1)))
 
     @property
     def learns(self) -> bool:
@@ -206,14 +208,14 @@ class Cohort:
                 self._transitions,
                 self.replay,
                 self.stored,
+                self._streams,
                 self._observed(),
             )
 
     def _fly_compiled(self) -> FlownEpisode:
         assert self._compiled is not None
         slots = self.scenario.num_slots
-        observed, streams = self._observed(), self._streams
-        flown = self._compiled.fly(observed, streams, self._plan, slots, self.updates)
+        flown = self._compiled.fly(self._observed(), self._plan, slots, self.updates)
         self.updates += slots
         next_observation(self.collector).update(self.env.reset())
         return flown
@@ -237,33 +239,19 @@ class Cohort:
                 forget_moments(step.optimizer, where)
             self.stored[:, where] = 0
 
-    def evaluate(self, episodes: int, seed: int, scheme: str | None = None) -> NoiseFreeReturn:
+    def evaluate(
+        self, episodes: int, seed: int, scheme: str | None = None
+    ) -> tuple[NoiseFreeReturn, Tensor]:
         """Fly the current actors without noise, all of them through the same fading.
 
         Args:
             episodes: flown by each learner.
             seed: of the fading.
             scheme: that all learners fly; None for each learner's own.
+
+        Returns:
+            as :func:`hyuav.learning.policy.fly_noise_free`.
         """
-        return self._fly_noise_free(episodes, seed, scheme)[0]
-
-    def keep_best(self, episodes: int, seed: int) -> NoiseFreeReturn:
-        """Evaluate; where a learner never earned more, its weights are the best.
-
-        Args:
-            episodes: flown by each learner.
-            seed: of the fading.
-        """
-        earned, positions = self._fly_noise_free(episodes, seed, None)
-        better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
-        self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
-        replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
-        self.algorithm.guide.end_evaluation(positions)
-        return earned
-
-    def _fly_noise_free(
-        self, episodes: int, seed: int, scheme: str | None
-    ) -> tuple[NoiseFreeReturn, Tensor]:
         env = make_env(
             self.scenario,
             self.env.base_env.schemes if scheme is None else scheme,
@@ -273,6 +261,20 @@ class Cohort:
             **self._parameters.environment,
         )
         return fly_noise_free(env, self.algorithm, self._parameters.reward_scale)
+
+    def keep_best(self, episodes: int, seed: int) -> NoiseFreeReturn:
+        """Evaluate; where a learner never earned more, its weights are the best.
+
+        Args:
+            episodes: flown by each learner.
+            seed: of the fading.
+        """
+        earned, positions = self.evaluate(episodes, seed)
+        better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
+        self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
+        replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
+        self.algorithm.guide.end_evaluation(positions)
+        return earned
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that evolves; the tensors are the cohort's own."""

@@ -33,7 +33,7 @@ from hyuav.learning.compile import FlownEpisode
 from hyuav.learning.memory import require_memory
 from hyuav.learning.policy import NoiseFreeReturn
 from hyuav.learning.train import Cohort, Learner
-from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learner
+from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learners
 from hyuav.physics.scenario import Scenario
 
 COMPILE_SECONDS = 20.0
@@ -129,15 +129,18 @@ class Training:
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
         self.scenario, self.parameters = scenario, parameters
         self.learners = tuple(learners)
-        on_cpu = as_device(device).type == "cpu"
+        device = as_device(device)
+        on_cpu = device.type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
         longest = max(self.horizons)
         if parameters.replay_size < algorithm.least_replay(longest):
             accepted = f"at least the {longest} slots of a flight, to keep the best"
             raise InputError(rejection("replay_size", parameters.replay_size, accepted))
         needs = algorithm.needed_memory(scenario, self.horizons, parameters.sizes)
-        require_memory(needs, len(self.learners), as_device(device))
+        require_memory(needs, len(self.learners), device)
         self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
+        order = [index for members in self._members for index in members]
+        self._order = sorted(range(len(order)), key=order.__getitem__)
         self.cohorts = [
             Cohort(
                 dataclasses.replace(scenario, num_slots=self.horizons[members[0]]),
@@ -187,20 +190,12 @@ class Training:
     @property
     def best_weights(self) -> dict[str, Tensor]:
         """The weights that reached it, of all learners."""
-        return self._join([cohort.best_weights for cohort in self.cohorts])
+        weights = join_learners([cohort.best_weights for cohort in self.cohorts])
+        return select_learners(weights, self._order)
 
     def _in_order(self, values: Sequence[Tensor]) -> Tensor:
         """Values (n,) of each cohort as those of all learners (N,)."""
-        order = [index for members in self._members for index in members]
-        return torch.cat(list(values)).cpu()[sorted(range(len(order)), key=order.__getitem__)]
-
-    def _join(self, weights: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
-        by_learner = {
-            index: select_learner(own, position)
-            for own, members in zip(weights, self._members, strict=True)
-            for position, index in enumerate(members)
-        }
-        return join_learners([by_learner[index] for index in range(len(self.learners))])
+        return torch.cat(list(values)).cpu()[self._order]
 
     def episodes(self) -> Iterator[Episode]:
         """Train until ``num_episodes`` are flown; report each episode as it ends.
@@ -271,7 +266,7 @@ class Training:
             scheme: that all learners fly; None for each learner's own.
         """
         evaluated = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
-        return self._together([cohort.evaluate(*evaluated, scheme) for cohort in self.cohorts])
+        return self._together([cohort.evaluate(*evaluated, scheme)[0] for cohort in self.cohorts])
 
     def _keep_best(self) -> NoiseFreeReturn:
         """Evaluate; where a learner has never been better, its weights are the best so far."""
@@ -297,9 +292,7 @@ class Training:
             accepted = f"expected {len(self.learners)} learners, or one"
             raise InputError(f"checkpoint: it holds {several} learners: {accepted}")
         for cohort, members in zip(self.cohorts, self._members, strict=True):
-            own = weights
-            if several > 1:
-                own = join_learners([select_learner(weights, index) for index in members])
+            own = weights if several == 1 else select_learners(weights, members)
             load_weights(cohort.algorithm.loss, own)
 
     def warm_start(self, weights: dict[str, Tensor]) -> None:

@@ -98,17 +98,22 @@ def count_learners(weights: dict[str, Tensor]) -> int:
     return values.shape[_learner_axis(values)]
 
 
-def select_learner(weights: dict[str, Tensor], learner: int) -> dict[str, Tensor]:
-    """The weights of one learner, with a learner axis of length one.
+def select_learners(weights: dict[str, Tensor], learners: Sequence[int]) -> dict[str, Tensor]:
+    """A copy of the weights of these learners, in this order.
 
     Raises:
         InputError: some are of fewer learners.
     """
     for name, values in weights.items():
-        if not 0 <= learner < values.shape[_learner_axis(values)]:
-            raise InputError(f"checkpoint: {brief(name)} is not of {learner + 1} learners or more")
+        for learner in learners:
+            if not 0 <= learner < values.shape[_learner_axis(values)]:
+                accepted = f"{learner + 1} learners or more"
+                raise InputError(f"checkpoint: {brief(name)} is not of {accepted}")
     return {
-        name: values.narrow(_learner_axis(values), learner, 1) for name, values in weights.items()
+        name: values.index_select(
+            _learner_axis(values), torch.tensor(learners, device=values.device)
+        )
+        for name, values in weights.items()
     }
 
 

@@ -128,7 +128,7 @@ def test_evaluations_are_told_without_chance_and_with_the_same_mean() -> None:
     trained = guided(scenario, [0], 400, 50)
     for _ in range(60):
         trained.fly()
-    earned = [trained.evaluate(20, seed) for seed in range(60)]
+    earned = [trained.evaluate(20, seed)[0] for seed in range(60)]
     adjusted = torch.cat([own.reward for own in earned])
     raw = torch.cat([own.sum_rate for own in earned])
     assert adjusted.std() < 0.7 * raw.std()

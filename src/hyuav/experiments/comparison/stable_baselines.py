@@ -23,10 +23,10 @@ from hyuav.physics.scenario import Scenario
 class Actor(TensorDictModuleBase):
     """An actor of Stable-Baselines3 as a way to fly batches.
 
-    Reads ``observation`` (..., U + 5), writes ``action`` (..., 2) in [-1, 1].
+    Reads ``observation`` (..., observed), writes ``action`` (..., 2) in [-1, 1].
 
     Args:
-        actor: maps (B, U + 5) to (B, 2).
+        actor: maps (B, observed) to (B, 2).
     """
 
     in_keys = ("observation",)

@@ -51,7 +51,7 @@ class Imitation:
         return replace(self._algorithm, steps=tuple(steps.values()))
 
     def actions(self, observation: Tensor) -> Tensor:
-        """The A demonstrated actions (N, A, K, 2) for observations (N, K, U + 5)."""
+        """The A demonstrated actions (N, A, K, 2) for observations (N, K, observed)."""
         hovering = observation.new_zeros(*observation.shape[:-1], 2)
         if not self._clock:
             return hovering.unsqueeze(1)

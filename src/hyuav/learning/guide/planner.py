@@ -50,7 +50,6 @@ class Planner(Guidance):
     ) -> None:
         super().__init__()
         self.guide, self._algorithm = guide, algorithm
-        self.plans = guide.repeat_every > 0
         self._env, self._seeds = env, seeds
         learners, self._scenario = len(seeds), env.base_env.scenario
         self._layout = ObservationLayout(self._scenario, clock=algorithm.clock)
@@ -110,7 +109,7 @@ class Planner(Guidance):
 
     def plan(self, episode: int) -> Tensor | None:
         """The planned flight, in the episodes that take one."""
-        if not self.plans:
+        if not self.guide.repeat_every:
             return None
         planned = self.flights.planned_actions
         return planned if self.guide.repeats(episode) else planned * torch.nan

@@ -5,21 +5,19 @@ What each piece is for, and how near to the optimum they come, is told in docs/r
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated
 
-from pydantic import Field
 from pydantic.dataclasses import dataclass
 from torchrl.envs import TransformedEnv
 
-from hyuav._support.parameters import Fraction, OneOf, PositiveNumber, parameter
-from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
-from hyuav.learning.ddpg import DDPG
+from hyuav._support.parameters import Fraction, PositiveNumber, parameter
+from hyuav.learning.algorithm import ActionScale, Algorithm, AlgorithmParameters
+from hyuav.learning.ddpg import DDPG, NoiseVariance, SlotOrEpisode
 from hyuav.learning.guide.parameters import Guide
 from hyuav.learning.guide.planner import Planner
 from hyuav.learning.guide.reward_model import feature_count
 from hyuav.learning.memory import Need
 from hyuav.learning.replay import FADING, TransitionOptions
-from hyuav.learning.sac import SAC
+from hyuav.learning.sac import SAC, Entropy, Temperature
 from hyuav.learning.td3 import TD3
 from hyuav.physics.channel import LinkRow
 from hyuav.physics.scenario import Scenario
@@ -37,7 +35,7 @@ class Robust(AlgorithmParameters):
     reward_scale: PositiveNumber = parameter(0.05)
     layer_norm: bool = parameter(True)
     afterstate: bool = parameter(True)
-    action_scale: Annotated[float, Field(ge=1.0, le=2.0)] = parameter(1.04)
+    action_scale: ActionScale = parameter(1.04)
     guide: Guide | None = parameter(Guide())
     """What guides the learners while they train; null for nothing."""
 
@@ -81,9 +79,9 @@ class Robust(AlgorithmParameters):
 class RobustDDPG(Robust, DDPG):
     """DDPG that looks for the best flight within the horizon, and does not forget a good one."""
 
-    noise_variance: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(0.16)
+    noise_variance: NoiseVariance = parameter(0.16)
     noise_decay: Fraction = parameter(0.985)
-    noise_decay_per: Annotated[str, OneOf("slot", "episode")] = parameter("episode")
+    noise_decay_per: SlotOrEpisode = parameter("episode")
 
 
 @dataclass(frozen=True)
@@ -95,5 +93,5 @@ class RobustTD3(RobustDDPG, TD3):
 class RobustSAC(Robust, SAC):
     """SAC with the same pieces; its noise-free actor is scaled, what it explores with is not."""
 
-    temperature_init: Annotated[float, Field(ge=1e-6, le=1e6)] = parameter(0.01)
-    target_entropy: Annotated[float, Field(ge=-100.0, le=100.0)] = parameter(-4.0)
+    temperature_init: Temperature = parameter(0.01)
+    target_entropy: Entropy = parameter(-4.0)

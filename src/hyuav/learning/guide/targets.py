@@ -16,8 +16,8 @@ class RaisedTD0(TD0Estimator):
     as in Q-learning, which looks for the best action there is.
 
     Args:
-        alternative: maps observations (N, K, U + 5) to what acting otherwise is worth in them,
-            (N, K, 1).
+        alternative: maps observations (N, K, observed) to what acting otherwise is worth in
+            them, (N, K, 1).
         options: of TorchRL's estimator.
     """
 
