@@ -105,19 +105,11 @@ def recipe(
             composed = True
             for reference in references:  # which a launcher's worker has not run yet
                 run_own(reference)
-            directory = Path(HydraConfig.get().runtime.output_dir)
             hint = "" if NOW in run_directory else ", and the same command goes on"
-            try:
-                with _halting(hint):
-                    function(_plain(config, names, groups, sections), directory)
-            except (InputError, Halted) as error:
-                remove_if_empty(directory)
-                if HydraConfig.get().mode is RunMode.MULTIRUN:
-                    raise  # the other jobs go on, and Hydra says which one it was
-                status = 1 if isinstance(error, Halted) else 2
-                _end(str(error), status)  # here, before Hydra adds lines of its own
+            with _job(hint) as directory:
+                function(_plain(config, names, groups, sections), directory)
 
-        # Or Hydra would take this package's folders for groups: hyuav/figures for ``figures=...``.
+        # Or Hydra would take this package's folders for groups: hyuav/viz for ``viz=...``.
         run.__module__ = "__main__"
 
         def command() -> None:
@@ -142,6 +134,24 @@ def recipe(
         return command
 
     return decorate
+
+
+@contextmanager
+def _job(hint: str) -> Iterator[Path]:
+    """Do one job in its directory; a refusal or a halt of the only one ends the command.
+
+    Args:
+        hint: on how to go on after a halt.
+    """
+    directory = Path(HydraConfig.get().runtime.output_dir)
+    try:
+        with _halting(hint):
+            yield directory
+    except (InputError, Halted) as error:
+        remove_if_empty(directory)
+        if HydraConfig.get().mode is RunMode.MULTIRUN:
+            raise  # the other jobs go on, and Hydra says which one it was
+        _end(str(error), 1 if isinstance(error, Halted) else 2)  # before Hydra adds lines
 
 
 def _node(

@@ -1,6 +1,6 @@
 """Copy, replace and hand over the weights of single learners on the learner axis.
 
-Stacked weights have the learner axis third from the end (:class:`LearnerLinear`; twin critics
+Stacked weights have the learner axis third from the end (:class:`.networks.LearnerLinear`; twin critics
 add one axis in front), and a learner's temperature has it in front of one more axis.
 """
 
