@@ -1,7 +1,7 @@
 """Copy, replace and hand over the weights of single learners on the learner axis.
 
-Stacked weights have the learner axis third from the end (:class:`.networks.LearnerLinear`; twin critics
-add one axis in front), and a learner's temperature has it in front of one more axis.
+Stacked weights have the learner axis third from the end, as :class:`.networks.LearnerLinear` has
+them; twin critics add one axis in front. A learner's temperature has it in front of one more axis.
 """
 
 from collections.abc import Sequence
