@@ -21,10 +21,11 @@ from benchmarks.parts import MEASURE
 from benchmarks.plan import Benchmark, devices, require_peers
 from benchmarks.results import Results
 from benchmarks.tables import print_tables
+from hyuav._support.files import require_writable
 from hyuav._support.machine import cores
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
-from hyuav.experiments.run_directory import named_scenario, require_writable
+from hyuav.experiments.run_directory import named_scenario
 
 
 @recipe(

@@ -18,6 +18,7 @@ from pydantic.dataclasses import dataclass
 from rich.console import Console
 
 from hyuav._support.errors import InputError, rejection
+from hyuav._support.files import require_writable
 from hyuav._support.parameters import (
     Count,
     OneOrMore,
@@ -38,7 +39,7 @@ from hyuav.experiments.evaluation import (
 from hyuav.experiments.evaluation_table import print_results
 from hyuav.experiments.own_algorithms import OwnAlgorithm
 from hyuav.experiments.policies import learned_policies, reference_policies
-from hyuav.experiments.run_directory import RunDirectory, require_writable
+from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
 from hyuav.viz.html.page import write_report
 from hyuav.viz.paper.flights import save_flight_map

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from hydra.core.config_store import ConfigStore
-from hydra.main import get_args_parser
+from hydra.main import get_args_parser  # type: ignore[attr-defined]
 
 from hyuav._support.errors import InputError, brief, rejection
 from hyuav._support.yaml_files import read_yaml
