@@ -100,7 +100,9 @@ class SecureOffloadingEnv(EnvBase):
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
         rules = ModeRule.of(self.schemes, self.device)
-        self._mode_rule = ModeRule(*(self._per_row(torch.as_tensor(flags)) for flags in rules))
+        self._mode_rule = ModeRule(
+            *(self._per_row(torch.as_tensor(flags, device=self.device)) for flags in rules)
+        )
         norm_limit = self.physics.norm_limit(self.schemes)
         self._norm_limit = None
         if norm_limit is not None:

@@ -50,7 +50,7 @@ def ue_can_pay(scenario: Scenario, *, relay: bool) -> bool:
 def edge_can_saturate(scenario: Scenario) -> bool:
     """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
     cycles = scenario.num_ues * scenario.task_size[1] * scenario.cycles_per_bit[1]
-    frequency = torch.tensor(cycles / scenario.slot_duration, dtype=torch.float64)
+    frequency = torch.tensor(cycles / scenario.slot_duration, dtype=torch.float64, device="cpu")
     spent = computation_energy(frequency, scenario.capacitance, scenario.slot_duration)
     return bool(spent > scenario.edge_energy_budget)
 

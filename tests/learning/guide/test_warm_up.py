@@ -17,7 +17,7 @@ def fly(warm_up: WarmUp, learners: int, num_slots: int) -> torch.Tensor:
         seen = TensorDict(
             action=torch.zeros(learners, 2),
             step_count=torch.full((learners, 1), count),
-            position=position,
+            position=position.unsqueeze(-2),
             batch_size=[learners],
         )
         position = (position + 20.0 * warm_up(seen)["action"]).clamp(-100.0, 100.0)

@@ -101,10 +101,11 @@ class Compare(Parameters):
     """Directory of the comparison, which may have been begun."""
 
     def __post_init__(self) -> None:
-        for name in self.algorithm:
+        for index, name in enumerate(self.algorithm):
             if is_reference(name):
                 find(name)
-            require_choice("algorithm", name, [*names(), PEER])
+            place = f"algorithm[{index}]" if len(self.algorithm) > 1 else "algorithm"
+            require_choice(place, name, [*names(), PEER])
         for name in ("algorithm", "without", "scenario", "scheme", "num_slots"):
             values = getattr(self, name)
             if len(set(values)) < len(values):
