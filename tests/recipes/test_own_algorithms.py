@@ -80,7 +80,7 @@ def test_workers_of_a_comparison_run_it_too(call: Call, tmp_path: Path, own: str
         ("train", "algorithm=gone.py:Own", "algorithm = 'gone.py': expected a Python file"),
         ("train", "algorithm=mine/own.py", "algorithm = 'mine/own.py': expected a class in it"),
         ("compare", "algorithm=[ddpg,gone.py:Own]", "algorithm = 'gone.py': expected a Python"),
-        ("compare", "algorithm=[ddpg,own]", "algorithm = 'own': expected one of ddpg,"),
+        ("compare", "algorithm=[ddpg,own]", "algorithm[1] = 'own': expected one of ddpg,"),
         ("evaluate", "algorithm=ddpg", "algorithm = 'ddpg': expected FILE.py:CLASS"),
     ],
 )
