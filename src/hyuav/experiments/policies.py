@@ -12,7 +12,6 @@ from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.policy import LearnedPolicy
-from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
@@ -56,10 +55,7 @@ def learned_policies(
     policies: dict[str, list[Policy]] = {}
     horizons: set[int] = set()
     for run in runs:
-        configuration, weights = run.configuration(), run.best_weights()
-        if count_learners(weights) != len(configuration.learners):
-            accepted = f"weights of {len(configuration.learners)} learners"
-            raise InputError(rejection("checkpoint", str(run.best_checkpoint), accepted))
+        configuration, weights = run.trained()
         by_scheme: dict[str, list[int]] = {}
         for index, learner in enumerate(configuration.learners):
             horizon = learner.num_slots or configuration.scenario.num_slots

@@ -24,6 +24,7 @@ from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.registry import find
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
+from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import PRESETS, Scenario
 
 REPORT_FILE = "report.html"
@@ -232,6 +233,18 @@ class RunDirectory:
             InputError: there is no such checkpoint, or it is truncated or foreign.
         """
         return load_weights_file(self.best_checkpoint)
+
+    def trained(self) -> tuple[RunConfiguration, dict[str, Tensor]]:
+        """What the training was asked to do, and the best weights so far of its learners.
+
+        Raises:
+            InputError: one of them cannot be read, or they are of different numbers of learners.
+        """
+        configuration, weights = self.configuration(), self.best_weights()
+        if count_learners(weights) != len(configuration.learners):
+            accepted = f"weights of {len(configuration.learners)} learners"
+            raise InputError(rejection("checkpoint", str(self.best_checkpoint), accepted))
+        return configuration, weights
 
     def metrics(self) -> pd.DataFrame:
         """What training brought, as :func:`hyuav.experiments.metrics.read_metrics` reads it."""

@@ -13,7 +13,6 @@ from hyuav.experiments.policies import learned_policies, learned_policy, straigh
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.train import Learner
-from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve_optimum
 from hyuav.viz.data.index import RunIndex, Stamp
@@ -151,12 +150,7 @@ def _policy(scenario: Scenario, checkpoint: Checkpoint) -> Policy:
 @lru_cache(maxsize=8)
 def _saved(run: str, stamp: Stamp) -> tuple[RunConfiguration, dict[str, Tensor]]:  # noqa: ARG001
     """What a run keeps; the stamp has a file that was written anew read anew."""
-    directory = RunDirectory(run)
-    configuration, weights = directory.configuration(), directory.best_weights()
-    if count_learners(weights) != len(configuration.learners):
-        accepted = f"weights of {len(configuration.learners)} learners"
-        raise InputError(rejection("checkpoint", str(directory.best_checkpoint), accepted))
-    return configuration, weights
+    return RunDirectory(run).trained()
 
 
 def fly_now(run: RunDirectory, name: str) -> tuple[Scenario, Evaluation]:
