@@ -3,11 +3,11 @@
 import torch
 
 from benchmarks.work import Work
-from hyuav.experiments.evaluation import EvaluationParameters, Policy, evaluate
+from hyuav.experiments.evaluation import EvaluationParameters, evaluate
 from hyuav.experiments.policies import straight_policies
 from hyuav.experiments.schemes import LEARNED
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.policy import LearnedPolicy
+from hyuav.learning.policy import learned_policy
 from hyuav.learning.weights import copy_weights, draw_weights
 from hyuav.references.optimum import solve_optimum
 
@@ -29,9 +29,9 @@ class FiveSchemes:
         algorithm = DDPG(hidden_sizes=work.hidden_sizes)
         loss = algorithm.build(1, scenario).loss
         draw_weights(loss, [work.seed], "weights")
-        actor = LearnedPolicy(scenario, algorithm, copy_weights(loss), [0])
+        actor = learned_policy(scenario, algorithm, copy_weights(loss))
         straight, _ = straight_policies(scenario)
-        self.policies = {name: [Policy(actor)] for name in LEARNED.values()} | straight
+        self.policies = {name: [actor] for name in LEARNED.values()} | straight
 
     def advance(self) -> int:
         """Evaluate all of them once."""

@@ -14,7 +14,7 @@ from hypothesis import settings
 
 import hyuav  # noqa: F401 - registers the environments
 from hyuav import Scenario
-from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 from recipe_calls import Call, Refusal
@@ -65,10 +65,10 @@ def scenario() -> Scenario:
 def evaluation(scenario: Scenario) -> Evaluation:
     """The straight flights and the optima; the hybrid optimum is flown as Proposed too."""
     optima = solve_optimum(scenario, resolution=5.0)
-    best = {rule: [Policy(FlightPolicy(found.path, scenario))] for rule, found in optima.items()}
+    best = {rule: FlightPolicy(found.path, scenario) for rule, found in optima.items()}
     policies = {
-        "re_lt": [Policy(re_lt(scenario))],
-        "ja_lt": [Policy(ja_lt(scenario))],
+        "re_lt": re_lt(scenario),
+        "ja_lt": ja_lt(scenario),
         "proposed": best["hybrid"],
         "optimum": best["hybrid"],
         "re_optimum": best["relay"],

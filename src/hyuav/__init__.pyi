@@ -10,14 +10,15 @@ from hyuav.envs.transforms import make_env as make_env
 from hyuav.experiments.comparison.plan import Compare as Compare
 from hyuav.experiments.comparison.work import compare as compare
 from hyuav.experiments.evaluation import EvaluationParameters as EvaluationParameters
-from hyuav.experiments.evaluation import Policy as Policy
 from hyuav.experiments.evaluation import evaluate as evaluate
-from hyuav.experiments.run_directory import load as load
+from hyuav.experiments.run import Run as Run
+from hyuav.experiments.run import load as load
 from hyuav.learning.ddpg import DDPG as DDPG
 from hyuav.learning.guide.parameters import Guide as Guide
 from hyuav.learning.guide.robust import RobustDDPG as RobustDDPG
 from hyuav.learning.guide.robust import RobustSAC as RobustSAC
 from hyuav.learning.guide.robust import RobustTD3 as RobustTD3
+from hyuav.learning.policy import Policy as Policy
 from hyuav.learning.registry import register as register
 from hyuav.learning.sac import SAC as SAC
 from hyuav.learning.td3 import TD3 as TD3

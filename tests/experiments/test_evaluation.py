@@ -1,26 +1,29 @@
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 from scipy import stats
+from torch import nn
 
 from batches import TEN_UES
-from hyuav import InputError, Scenario
+from hyuav import InputError, Policy, Scenario
 from hyuav.experiments.evaluation import (
     EvaluationParameters,
-    Policy,
     confidence_interval,
     evaluate,
     fly,
     secrecy_sum_rate,
 )
+from hyuav.experiments.policies import Policies
 from hyuav.experiments.schemes import LABELS, OPTIMA
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.policy import LearnedPolicy
+from hyuav.learning.guide.robust import RobustTD3
+from hyuav.learning.policy import learned_policy
 from hyuav.learning.weights import copy_weights
 from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
@@ -30,22 +33,21 @@ FEW = EvaluationParameters(episodes=40, flights=2, seed=5)
 
 
 @pytest.fixture(scope="module")
-def policies() -> dict[str, list[Policy]]:
+def policies() -> Policies:
     algorithm = DDPG(hidden_sizes=(8,))
     weights = copy_weights(algorithm.build(2, TEN_UES).loss)
     optima = solve_optimum(SCENARIO, resolution=2.0)
     return {
-        "re_lt": [Policy(re_lt(SCENARIO))],
-        "ja_lt": [Policy(ja_lt(SCENARIO))],
-        "proposed": [Policy(LearnedPolicy(SCENARIO, algorithm, weights, range(2)), 2)],
+        "re_lt": [re_lt(SCENARIO)],
+        "ja_lt": [ja_lt(SCENARIO)],
+        "proposed": [learned_policy(SCENARIO, algorithm, weights, range(2))],
         **{
-            OPTIMA[rule]: [Policy(FlightPolicy(optimum.path, SCENARIO))]
-            for rule, optimum in optima.items()
+            OPTIMA[rule]: [FlightPolicy(optimum.path, SCENARIO)] for rule, optimum in optima.items()
         },
     }
 
 
-def test_the_summary_has_the_promised_fields(policies: dict[str, list[Policy]]) -> None:
+def test_the_summary_has_the_promised_fields(policies: Policies) -> None:
     summary = evaluate(SCENARIO, "two_clusters", policies, FEW).summary
     assert summary["scenario"] == "two_clusters"
     assert (summary["num_slots"], summary["episodes"]) == (10, 40)
@@ -60,7 +62,7 @@ def test_the_summary_has_the_promised_fields(policies: dict[str, list[Policy]]) 
 
 
 def test_a_fixed_mode_scheme_is_measured_against_its_own_optimum_and_the_hybrid_one(
-    policies: dict[str, list[Policy]],
+    policies: Policies,
 ) -> None:
     schemes = evaluate(SCENARIO, "two_clusters", policies, FEW).summary["schemes"]
     mean = {name: result["secrecy_sum_rate"]["mean"] for name, result in schemes.items()}
@@ -72,7 +74,7 @@ def test_a_fixed_mode_scheme_is_measured_against_its_own_optimum_and_the_hybrid_
 def test_all_schemes_fly_through_the_same_fading() -> None:
     everywhere = SCENARIO.helper_starts[0]
     still = dataclasses.replace(SCENARIO, eavesdropper_positions=(everywhere,))
-    hovering = Policy(ja_lt(still))
+    hovering = ja_lt(still)
     few = EvaluationParameters(episodes=5, flights=5, seed=3)
     twice = [fly(still, scheme, hovering, few).slots for scheme in ("ja_lt", "optimum")]
     for rates in ("relay_sum_rate", "jamming_sum_rate"):
@@ -81,16 +83,18 @@ def test_all_schemes_fly_through_the_same_fading() -> None:
 
 
 def test_all_learners_fly_through_the_same_fading() -> None:
-    twins = Policy(ja_lt(SCENARIO), 2)
-    first, second = fly(SCENARIO, "ja_lt", twins, FEW).totals["secrecy_sum_rate"]
+    algorithm = DDPG(hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(1, TEN_UES).loss)
+    twins = learned_policy(SCENARIO, algorithm, weights, [0, 0])
+    first, second = fly(SCENARIO, "proposed", twins, FEW).totals["secrecy_sum_rate"]
     assert torch.equal(first, second)
 
 
 def test_a_learner_earns_among_others_what_it_earns_alone() -> None:
     algorithm = DDPG(hidden_sizes=(8,))
     weights = copy_weights(algorithm.build(3, TEN_UES).loss)
-    among = Policy(LearnedPolicy(SCENARIO, algorithm, weights, [2, 0]), 2)
-    alone = Policy(LearnedPolicy(SCENARIO, algorithm, weights, [0]))
+    among = learned_policy(SCENARIO, algorithm, weights, [2, 0])
+    alone = learned_policy(SCENARIO, algorithm, weights, [0])
     torch.testing.assert_close(
         fly(SCENARIO, "proposed", among, FEW).totals["secrecy_sum_rate"][1:],
         fly(SCENARIO, "proposed", alone, FEW).totals["secrecy_sum_rate"],
@@ -99,7 +103,7 @@ def test_a_learner_earns_among_others_what_it_earns_alone() -> None:
 
 def test_the_totals_are_sums_over_the_slots_of_an_episode() -> None:
     every = EvaluationParameters(episodes=6, flights=6)
-    flown = fly(SCENARIO, "optimum", Policy(re_lt(SCENARIO)), every)
+    flown = fly(SCENARIO, "optimum", re_lt(SCENARIO), every)
     diagnostics = flown.slots["diagnostics"]
     for name, per_slot in (
         ("secrecy_sum_rate", secrecy_sum_rate(flown.slots)),
@@ -114,7 +118,7 @@ def test_the_totals_are_sums_over_the_slots_of_an_episode() -> None:
 
 def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> None:
     leaving = dataclasses.replace(SCENARIO, eavesdropper_positions=((-100.0, -100.0),))
-    policy = Policy(ja_lt(dataclasses.replace(leaving, num_slots=3)))
+    policy = ja_lt(dataclasses.replace(leaving, num_slots=3))
     flown = fly(leaving, "ja_lt", policy, EvaluationParameters(episodes=4, flights=4)).slots
     assert flown["off_map"].any()
     torch.testing.assert_close(
@@ -122,7 +126,7 @@ def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> Non
     )
 
 
-def test_flights_are_kept_a_row_per_slot(policies: dict[str, list[Policy]], tmp_path: Path) -> None:
+def test_flights_are_kept_a_row_per_slot(policies: Policies, tmp_path: Path) -> None:
     evaluation = evaluate(SCENARIO, "two_clusters", policies, FEW)
     evaluation.save(tmp_path)
     flights = pd.read_parquet(tmp_path / "flights.parquet")
@@ -153,12 +157,43 @@ def test_the_interval_of_a_flight_without_fading_is_its_value() -> None:
     assert confidence_interval(np.full((1, 10), 7.0)) == [7.0, 7.0]
 
 
+class Leaving(nn.Module):
+    """Fly to the map's corner and beyond."""
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        return -torch.ones_like(observation[..., :2])
+
+
+def test_a_policy_is_evaluated_in_the_environment_that_it_was_trained_in() -> None:
+    algorithm = RobustTD3(hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(1, TEN_UES).loss)
+    fenced = fly(SCENARIO, "proposed", learned_policy(SCENARIO, algorithm, weights), FEW)
+    assert fenced.slots["observation"].shape[-1] == 16
+    for geofence in (True, False):
+        policy = Policy(Leaving(), SCENARIO, geofence=geofence)
+        assert fly(SCENARIO, "proposed", policy, FEW).slots["off_map"].any() != geofence
+
+
+def test_one_policy_is_taken_as_several_are() -> None:
+    straight = re_lt(SCENARIO)
+    one, several = (
+        evaluate(SCENARIO, "two_clusters", {"re_lt": given}, FEW).summary
+        for given in (straight, (straight,))
+    )
+    assert one == several
+
+
+def test_a_policy_of_another_number_of_ues_is_refused_in_one_line() -> None:
+    fewer = dataclasses.replace(SCENARIO, ue_positions=SCENARIO.ue_positions[1:])
+    policy = Policy(nn.Linear(15, 2), SCENARIO)
+    with pytest.raises(InputError, match=r"observation = \(1, 40, 14\): .* 10 UEs and clock=False"):
+        evaluate(fewer, "fewer", {"proposed": policy}, FEW)
+
+
 def test_an_unknown_scheme_or_none_is_refused() -> None:
-    refused: list[dict[str, list[Policy]]] = [
-        {},
-        {"proposed": []},
-        {"foo": [Policy(re_lt(SCENARIO))]},
-    ]
+    straight = re_lt(SCENARIO)
+    refused: list[Any] = [{}, {"proposed": []}, {"foo": [straight]}]
+    refused += [{"proposed": given} for given in (None, "policy.pt", ["policy.pt"], {1: straight})]
     for policies in refused:
         with pytest.raises(InputError):
             evaluate(SCENARIO, "two_clusters", policies, FEW)

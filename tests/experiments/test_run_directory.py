@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from hyuav import InputError, Scenario, load
+from hyuav import InputError, Scenario
 from hyuav.experiments.run_directory import (
     RunConfiguration,
     RunDirectory,
@@ -29,13 +29,6 @@ CONFIGURATION = RunConfiguration(
 def test_a_run_remembers_its_configuration_without_loss(tmp_path: Path) -> None:
     run = RunDirectory.create(tmp_path / "run", CONFIGURATION)
     assert run.configuration() == CONFIGURATION
-
-
-def test_a_run_that_is_there_is_loaded(tmp_path: Path) -> None:
-    RunDirectory.create(tmp_path / "run", CONFIGURATION)
-    assert load(tmp_path / "run").configuration() == CONFIGURATION
-    with pytest.raises(InputError, match=r"^run = '.*': expected a run directory"):
-        load(tmp_path)
 
 
 def test_a_run_never_overwrites_another(tmp_path: Path) -> None:

@@ -24,7 +24,6 @@ from hostile import CASES, TRIED, anything, attempt, fuzz, mutated, texts
 from hyuav import InputError, Scenario
 from hyuav._support.errors import Halted
 from hyuav.experiments.initial_weights import saved_weights
-from hyuav.experiments.policies import learned_policy
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train
@@ -32,6 +31,7 @@ from hyuav.learning.checkpoint import FORMAT, load_checkpoint, save_checkpoint
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.parameters import Guide
 from hyuav.learning.guide.robust import RobustSAC
+from hyuav.learning.policy import learned_policy
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
@@ -90,7 +90,7 @@ def fly(path: Path) -> None:
         warnings.simplefilter("ignore")
         from tensordict import TensorDict
 
-        acted = policy.module(TensorDict(observation=observed, batch_size=(2, 3)))
+        acted = policy(TensorDict(observation=observed, batch_size=(2, 3)))
     assert acted["action"].isfinite().all()
 
 

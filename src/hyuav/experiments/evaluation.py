@@ -16,12 +16,13 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.files import write_durably
 from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNumber, parameter
 from hyuav._support.randomness import derived_seed
 from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
+from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import RESOLUTION
 
@@ -38,20 +39,6 @@ class EvaluationParameters(Parameters):
     flights: Count = parameter(3)
     seed: CountOrZero = parameter(10_000)
     resolution: PositiveNumber = parameter(RESOLUTION, unit="m")
-
-
-@dataclass(frozen=True)
-class Policy:
-    """A way to fly and what it needs to observe."""
-
-    module: TensorDictModuleBase
-    """Writes ``action`` (learners, ..., 2)."""
-    learners: int = 1
-    """How many it flies, each in one row."""
-    clock: bool = False
-    """Whether ``observation`` carries the slots flown."""
-    geofence: bool = False
-    """Whether its flights are slowed to end on the map."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +64,7 @@ class Evaluation:
 def evaluate(
     scenario: Scenario,
     name: str,
-    policies: Mapping[str, Sequence[Policy]],
+    policies: Mapping[str, TensorDictModuleBase | Sequence[TensorDictModuleBase]],
     parameters: EvaluationParameters,
     device: torch.device | str | None = None,
     *,
@@ -88,26 +75,28 @@ def evaluate(
     Args:
         scenario: node positions and parameters.
         name: of the scenario, for the record.
-        policies: by scheme, names of :data:`.schemes.SCHEMES`: one or more, as from several seeds.
-            Fractions of the optimum are given where the optima are among them.
+        policies: by scheme, names of :data:`.schemes.SCHEMES`: one or more, as from several seeds,
+            that write ``action``. Fractions of the optimum are given where the optima are among
+            them.
         parameters: how many episodes, how many of them kept slot by slot, and the seed.
         device: to fly on.
         track: passes on the schemes one by one, as what shows the progress does.
 
     Raises:
-        InputError: no scheme, an unknown one, or one without a policy.
+        InputError: no scheme, an unknown one, one without a policy, or a policy of another number
+            of UEs.
+        InputTypeError: something else than a policy.
     """
-    for scheme, several in policies.items():
+    for scheme in policies:
         require_choice("scheme", scheme, SCHEMES)
-        if not several:
-            raise InputError(rejection(f"policies[{scheme!r}]", several, "at least one policy"))
     if not policies:
         raise InputError(rejection("policies", policies, "at least one scheme"))
+    by_scheme = {scheme: _several(scheme, given) for scheme, given in policies.items()}
     flown = {
         scheme: _together(
-            [fly(scenario, scheme, policy, parameters, device) for policy in policies[scheme]]
+            [fly(scenario, scheme, policy, parameters, device) for policy in by_scheme[scheme]]
         )
-        for scheme in track([scheme for scheme in SCHEMES if scheme in policies])
+        for scheme in track([scheme for scheme in SCHEMES if scheme in by_scheme])
     }
     returns = {
         scheme: flights.totals["secrecy_sum_rate"].numpy() for scheme, flights in flown.items()
@@ -127,6 +116,19 @@ def evaluate(
     return Evaluation(summary, pd.concat(rows, ignore_index=True))
 
 
+def _several(scheme: str, given: object) -> Sequence[TensorDictModuleBase]:
+    """One policy as several."""
+    several = [given] if isinstance(given, TensorDictModuleBase) else given
+    line = rejection(f"policies[{scheme!r}]", given, "at least one policy")
+    if not isinstance(several, Sequence):
+        raise InputTypeError(line)
+    if not several:
+        raise InputError(line)
+    if not all(isinstance(policy, TensorDictModuleBase) for policy in several):
+        raise InputTypeError(line)
+    return several
+
+
 @dataclass(frozen=True)
 class Flights:
     """What the flights of one scheme brought, on the CPU."""
@@ -142,24 +144,28 @@ class Flights:
 def fly(
     scenario: Scenario,
     scheme: str,
-    policy: Policy,
+    policy: TensorDictModuleBase,
     parameters: EvaluationParameters,
     device: torch.device | str | None = None,
 ) -> Flights:
-    """Fly all learners of a policy through the same episodes, with diagnostics."""
-    batch_size = policy.learners, parameters.episodes
-    seeds = [derived_seed(parameters.seed, "evaluation")] * policy.learners
+    """Fly all learners of a policy through the same episodes, with diagnostics.
+
+    A :class:`hyuav.Policy` flies in the environment that it was trained in, but for the scenario
+    and who chooses the mode; any other in that of :func:`hyuav.make_env`.
+    """
+    trained_in, learners = {}, 1
+    if isinstance(policy, Policy):
+        trained_in, learners = policy.environment, policy.learners
+    seeds = [derived_seed(parameters.seed, "evaluation")] * learners
+    asked = {"scenario": scenario, "scheme": SCHEMES[scheme].mode_rule}
     env = make_env(
-        scenario,
-        SCHEMES[scheme].mode_rule,
-        batch_size,
-        device,
-        seeds,
+        **{**trained_in, **asked},
+        batch_size=(learners, parameters.episodes),
+        device=device,
+        seed=seeds,
         diagnostics=True,
-        clock=policy.clock,
-        geofence=policy.geofence,
     )
-    module = policy.module.to(env.device)
+    module = policy.to(env.device)
     totals: dict[str, Tensor] = {}
     state, slots = env.reset(), []
     for _ in range(scenario.num_slots):

@@ -3,44 +3,40 @@
 from collections.abc import Mapping, Sequence
 
 from rich.console import Console
-from torch import Tensor
+from tensordict.nn import TensorDictModuleBase
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.terminal import make_progress, print_line
-from hyuav.experiments.evaluation import Policy
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
-from hyuav.learning.algorithm import AlgorithmParameters
-from hyuav.learning.policy import LearnedPolicy
+from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import FlightPolicy, solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
+Policies = dict[str, list[TensorDictModuleBase]]
+"""By scheme."""
 
-def learned_policy(
-    scenario: Scenario,
-    algorithm: AlgorithmParameters,
-    weights: dict[str, Tensor],
-    learners: Sequence[int],
-) -> Policy:
-    """The noise-free actors of some learners, in the environment that they were trained in.
 
-    Args:
-        scenario: to fly.
-        algorithm: with which they were trained.
-        weights: of all learners, as a training saves them.
-        learners: which of them.
+def require_nodes(policy: Policy, scenario: Scenario) -> None:
+    """Accept a scenario in which a policy observes as many nodes as where it was trained.
 
     Raises:
-        InputError: the weights do not fit the algorithm or the number of UEs.
+        InputError: it has another number of UEs or eavesdroppers.
     """
-    module = LearnedPolicy(scenario, algorithm, weights, learners)
-    return Policy(module, len(learners), algorithm.clock, algorithm.geofence)
+    trained_on = policy.environment["scenario"]
+    for name, own, other in (
+        ("UEs", trained_on.num_ues, scenario.num_ues),
+        ("eavesdroppers", trained_on.num_eavesdroppers, scenario.num_eavesdroppers),
+    ):
+        if own != other:
+            accepted = f"{own}, for which the checkpoint was trained"
+            raise InputError(rejection(f"number of {name}", other, accepted))
 
 
 def learned_policies(
     runs: Sequence[RunDirectory], scenario: Scenario, schemes: Mapping[str, str] = LEARNED
-) -> dict[str, list[Policy]]:
+) -> Policies:
     """The best actors of trainings for the scenario's horizon, as Proposed, Re-OT and Ja-OT.
 
     Args:
@@ -52,18 +48,18 @@ def learned_policies(
         InputError: a run or its checkpoint cannot be read, its actors observe another number of
             UEs than the scenario has, or none was trained for the horizon.
     """
-    policies: dict[str, list[Policy]] = {}
+    policies: Policies = {}
     horizons: set[int] = set()
     for run in runs:
         configuration, weights = run.trained()
+        horizons.update(configuration.horizons)
         by_scheme: dict[str, list[int]] = {}
         for index, learner in enumerate(configuration.learners):
-            horizon = learner.num_slots or configuration.scenario.num_slots
-            horizons.add(horizon)
-            if horizon == scenario.num_slots:
+            if configuration.horizons[index] == scenario.num_slots:
                 by_scheme.setdefault(schemes[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
-            policy = learned_policy(scenario, configuration.algorithm, weights, indices)
+            policy = configuration.policy(weights, indices)
+            require_nodes(policy, scenario)
             policies.setdefault(scheme, []).append(policy)
     if not policies:
         accepted = f"what learners were trained for, {', '.join(map(str, sorted(horizons)))}"
@@ -71,20 +67,19 @@ def learned_policies(
     return policies
 
 
-def straight_policies(scenario: Scenario) -> tuple[dict[str, list[Policy]], list[str]]:
+def straight_policies(scenario: Scenario) -> tuple[Policies, list[str]]:
     """Re-LT and Ja-LT, and a line for each that is too fast for the scenario and left out."""
-    policies, left_out = {}, []
+    policies: Policies = {}
+    left_out = []
     for name, straight in {"re_lt": re_lt, "ja_lt": ja_lt}.items():
         try:
-            policies[name] = [Policy(straight(scenario))]
+            policies[name] = [straight(scenario)]
         except InputError as error:
             left_out.append(f"{LABELS[name]} is left out: {error}")
     return policies, left_out
 
 
-def reference_policies(
-    scenario: Scenario, resolution: float, console: Console
-) -> dict[str, list[Policy]]:
+def reference_policies(scenario: Scenario, resolution: float, console: Console) -> Policies:
     """Re-LT, Ja-LT and the exact optimum of each mode rule.
 
     Args:
@@ -98,5 +93,5 @@ def reference_policies(
     with make_progress(console, "optima") as progress:
         optima = solve_optimum(scenario, resolution=resolution, track=progress.track)
     for rule, optimum in optima.items():
-        policies[OPTIMA[rule]] = [Policy(FlightPolicy(optimum.path, scenario))]
+        policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario)]
     return policies

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +21,7 @@ from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import read_metrics
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
+from hyuav.learning.policy import Policy, learned_policy
 from hyuav.learning.registry import find
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
@@ -81,6 +82,25 @@ class RunConfiguration:
             InputError: as :class:`hyuav.learning.training.Training`.
         """
         return Training(self.scenario, self.learners, self.algorithm, self.training, device)
+
+    @property
+    def horizons(self) -> tuple[int, ...]:
+        """Of the learners, in slots."""
+        return tuple(learner.num_slots or self.scenario.num_slots for learner in self.learners)
+
+    def policy(self, weights: dict[str, Tensor], learners: Sequence[int]) -> Policy:
+        """The noise-free actors of learners that share a scheme and a horizon.
+
+        Args:
+            weights: of all learners.
+            learners: which of them.
+
+        Raises:
+            InputError: the weights do not fit.
+        """
+        scenario = dataclasses.replace(self.scenario, num_slots=self.horizons[learners[0]])
+        scheme = self.learners[learners[0]].scheme
+        return learned_policy(scenario, self.algorithm, weights, learners, scheme)
 
 
 Learners = Annotated[tuple[Learner, ...], Field(min_length=1, description="a list of learners")]
@@ -249,21 +269,3 @@ class RunDirectory:
     def metrics(self) -> pd.DataFrame:
         """What training brought, as :func:`hyuav.experiments.metrics.read_metrics` reads it."""
         return read_metrics(self.metrics_file)
-
-
-def load(path: str | Path) -> RunDirectory:
-    """A run that was kept: its configuration, its metrics and its best weights.
-
-    Args:
-        path: of the run's directory.
-
-    Raises:
-        InputError: there is no run here, or its ``config.yaml`` is not one.
-
-    Example:
-        >>> run = load("runs/NAME")
-        >>> run.metrics().groupby("learner")["best_evaluation"].last()
-    """
-    run = RunDirectory(path)
-    run.configuration()
-    return run

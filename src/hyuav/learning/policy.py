@@ -1,18 +1,28 @@
-"""Actors that fly without noise: while they are trained, and as Proposed, Re-OT and Ja-OT."""
+"""Actors that fly without noise: while they are trained, and as policies afterwards."""
 
+import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
 import torch
-from tensordict import TensorDictBase
+from numpy.typing import NDArray
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from torch import Tensor
+from torch import Tensor, nn
 from torchrl.envs import TransformedEnv
 
+from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav._support.parameters import Count, checked
+from hyuav.envs.arguments import as_scenario
 from hyuav.envs.observation import ObservationLayout
+from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
 from hyuav.learning.weights import load_weights, select_learners
+from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import Scenario
+
+Observed = TypeVar("Observed", Tensor, NDArray[Any], TensorDictBase)
 
 
 class NoiseFreeReturn(NamedTuple):
@@ -56,18 +66,31 @@ def fly_noise_free(
     return earned, torch.stack(positions)
 
 
-class LearnedPolicy(TensorDictModuleBase):
-    """The noise-free actors of learners, for any batch of helpers.
+class Policy(TensorDictModuleBase):
+    """A way to fly by what is observed, which knows the environment that it was trained in.
+
+    It is a module of PyTorch that takes observations as a tensor or a NumPy array (..., observed),
+    and gives actions (..., 2 H) of the same kind, in [-1, 1]; of a TensorDict it reads
+    ``observation`` and writes ``action``. An observation that does not fit is refused in one line.
 
     Args:
-        scenario: that the actor was trained on, or another with as many UEs.
-        algorithm: with which it was trained.
-        weights: of N learners, as a training saves them.
-        learner: which of the N; or several, each of which flies one row of the batch's first
-            dimension.
+        network: maps observations (K, observed) to actions (K, 2 H), as a module of plain tensors,
+            or one of TensorDicts that reads ``observation`` and writes ``action``; of several
+            learners (N, K, observed) to (N, K, 2 H).
+        scenario: that it was trained on, or the name of a preset.
+        scheme: who chose the mode there: "hybrid", "relay" or "jamming".
+        clock: whether ``observation`` carried the slots flown; see :func:`hyuav.make_env`.
+        geofence: whether flights were slowed to end on the map.
+        learners: N. With one, it flies a batch of any shape; of several, each flies one row of the
+            batch's first dimension.
 
     Raises:
-        InputError: the weights do not fit the algorithm or the number of UEs.
+        InputError: an unknown preset or scheme.
+        InputTypeError: an argument of the wrong type, or a module that reads other entries.
+
+    Example:
+        >>> policy = hyuav.load("runs/NAME").policy
+        >>> flights = policy.make_env(batch_size=64, seed=0).rollout(20, policy)
     """
 
     in_keys = ("observation",)
@@ -75,24 +98,190 @@ class LearnedPolicy(TensorDictModuleBase):
 
     def __init__(
         self,
-        scenario: Scenario,
-        algorithm: AlgorithmParameters,
-        weights: dict[str, Tensor],
-        learner: int | Sequence[int] = 0,
+        network: nn.Module,
+        scenario: Scenario | str,
+        scheme: str = "hybrid",
+        *,
+        clock: bool = False,
+        geofence: bool = False,
+        learners: int = 1,
     ) -> None:
         super().__init__()
-        self._several = not isinstance(learner, int)
-        learners = [learner] if isinstance(learner, int) else learner
-        built = algorithm.build(len(learners), scenario)
-        load_weights(built.loss, select_learners(weights, learners))
-        self.actor = built.actor
+        require_choice("scheme", scheme, MODE_RULES)
+        self.environment: dict[str, Any] = {
+            "scenario": as_scenario(scenario),
+            "scheme": scheme,
+            "clock": checked(bool, "clock", clock),
+            "geofence": checked(bool, "geofence", geofence),
+        }
+        """The arguments of :func:`hyuav.make_env`, and of ``gymnasium.make``, by which an
+        environment is what it was in training."""
+        self.learners: int = checked(Count, "learners", learners)
+        self._layout = ObservationLayout(self.environment["scenario"], clock=clock)
+        self.network = _as_network(network)
+
+    def forward(self, observation: Observed) -> Observed:
+        """Act on observations (..., observed): actions (..., 2 H) of the same kind and device.
+
+        Args:
+            observation: a tensor or an array of finite floating-point numbers, of any precision;
+                or a TensorDict, into which ``action`` is written.
+
+        Raises:
+            InputError: of another size, or not finite.
+            InputTypeError: of another type.
+        """
+        if isinstance(observation, TensorDictBase):
+            self._require_environment(observation)
+            return observation.set("action", self._act(observation.get("observation", None)))
+        if isinstance(observation, np.ndarray):
+            if observation.dtype.kind != "f":
+                raise InputTypeError(rejection("observation", observation.dtype, self._accepted))
+            widest = np.array(observation, dtype=np.float64)  # in this machine's byte order
+            return self.forward(torch.from_numpy(widest)).numpy(force=True)
+        action = self._act(observation)
+        if not torch.compiler.is_compiling() and not observation.to(action).isfinite().all():
+            raise InputError(rejection("observation", observation.tolist(), self._accepted))
+        return action
 
     @torch.no_grad()
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Read ``observation`` (..., observed), write ``action`` (..., 2) in [-1, 1]."""
-        observed = tensordict.select("observation")
-        if self._several:
-            tensordict["action"] = self.actor(observed)["action"]
-        else:
-            tensordict["action"] = self.actor(observed.unsqueeze(0))["action"].squeeze(0)
-        return tensordict
+    def act(self, observation: Observed) -> Observed:
+        """The same without gradients: actions (..., 2 H) for observations (..., observed)."""
+        return self.forward(observation)
+
+    def predict(
+        self,
+        observation: NDArray[Any],
+        state: tuple[NDArray[Any], ...] | None = None,
+        episode_start: NDArray[Any] | None = None,  # noqa: ARG002
+        deterministic: bool = True,  # noqa: ARG002
+    ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
+        """Act as the models of Stable-Baselines3 do, so that its functions take this policy.
+
+        Args:
+            observation: (..., observed), as for :meth:`forward`.
+            state: given back as it is; the policy remembers nothing.
+            episode_start: not used, for the same reason.
+            deterministic: not used: it flies without noise in any case.
+
+        Returns:
+            the actions (..., 2 H), and ``state``.
+        """
+        return self.act(observation), state
+
+    def make_env(self, **options: Any) -> TransformedEnv:
+        """An environment as in training: its scenario, scheme, clock and geofence.
+
+        Args:
+            options: further arguments of :func:`hyuav.make_env`, such as ``batch_size`` and
+                ``seed``; what is given here takes the place of what was in training.
+
+        Raises:
+            InputError: as :func:`hyuav.make_env`.
+        """
+        return make_env(**{**self.environment, **options})
+
+    @property
+    def _rows(self) -> tuple[int, ...]:
+        return (self.learners,) if self.learners > 1 else ()
+
+    @property
+    def _accepted(self) -> str:
+        scenario, clock = self.environment["scenario"], self.environment["clock"]
+        shape = ", ".join([*map(str, self._rows), "...", str(self._layout.size)])
+        return (
+            f"finite floating-point numbers of shape ({shape}), as an environment gives with "
+            f"{scenario.num_ues} UEs and clock={clock} (policy.make_env() makes one)"
+        )
+
+    def _require_environment(self, state: TensorDictBase) -> None:
+        """Tell what can be seen of an environment that is not as in training."""
+        distances, off_map = state.get("distances", None), state.get("off_map", None)
+        if distances is not None and distances.shape[-1] != self._layout.num_distances:
+            shape = tuple(state["observation"].shape)
+            raise InputError(rejection("observation", shape, self._accepted))
+        fenced = self.environment["geofence"] and not torch.compiler.is_compiling()
+        if fenced and off_map is not None and off_map.any():
+            warnings.warn(
+                "the environment turned the helper back at the map's edge, but the policy was "
+                "trained with geofence=True: policy.make_env() makes such an environment",
+                stacklevel=4,
+            )
+
+    def _act(self, observation: Tensor) -> Tensor:
+        """Flatten what lies between the learners and the features, and apply the network."""
+        if not isinstance(observation, Tensor):
+            raise InputTypeError(rejection("observation", observation, self._accepted))
+        if not observation.is_floating_point():
+            raise InputTypeError(rejection("observation", observation.dtype, self._accepted))
+        shape, rows, size = observation.shape, self._rows, self._layout.size
+        if shape[-1:] != (size,) or shape[: len(rows)] != rows or len(shape) <= len(rows):
+            raise InputError(rejection("observation", tuple(shape), self._accepted))
+        like = next(self.network.parameters(), observation)
+        action: Tensor = self.network(observation.to(like).reshape(*rows, -1, size))
+        return action.reshape(*shape[:-1], self._layout.action_size).to(observation.device)
+
+
+class ActorNetwork(nn.Module):
+    """An actor that reads and writes TensorDicts, as a network of plain tensors.
+
+    Args:
+        actor: reads ``observation``, writes ``action``.
+        learner_axis: whether the actor has an axis of one learner in front, which the observations
+            have not.
+    """
+
+    def __init__(self, actor: TensorDictModuleBase, *, learner_axis: bool = False) -> None:
+        super().__init__()
+        self.actor, self.learner_axis = actor, learner_axis
+
+    def forward(self, observation: Tensor) -> Tensor:
+        """Map observations (..., observed) to actions (..., 2 H)."""
+        observed = observation.unsqueeze(0) if self.learner_axis else observation
+        entries = TensorDict({"observation": observed}, batch_size=observed.shape[:-1])
+        action: Tensor = self.actor(entries)["action"]
+        return action.squeeze(0) if self.learner_axis else action
+
+
+def _as_network(network: nn.Module) -> nn.Module:
+    if isinstance(network, TensorDictModuleBase):
+        if list(network.in_keys) != ["observation"] or "action" not in network.out_keys:
+            accepted = "a module that reads observation alone and writes action"
+            raise InputTypeError(rejection("network", type(network).__name__, accepted))
+        return ActorNetwork(network)
+    if not isinstance(network, nn.Module):
+        raise InputTypeError(rejection("network", network, "a torch.nn.Module"))
+    return network
+
+
+def learned_policy(
+    scenario: Scenario,
+    algorithm: AlgorithmParameters,
+    weights: dict[str, Tensor],
+    learners: Sequence[int] = (0,),
+    scheme: str = "hybrid",
+) -> Policy:
+    """The noise-free actors of learners, of which no gradient is kept.
+
+    Args:
+        scenario: that they were trained on.
+        algorithm: with which they were trained.
+        weights: of all learners, as a training saves them.
+        learners: which of them.
+        scheme: of theirs.
+
+    Raises:
+        InputError: the weights do not fit the algorithm or the number of UEs.
+    """
+    built = algorithm.build(len(learners), scenario)
+    own = select_learners(weights, learners)
+    load_weights(built.loss, own)
+    actor = built.actor.to(next(iter(own.values())).dtype)  # not the default type of tensors
+    return Policy(
+        ActorNetwork(actor, learner_axis=len(learners) == 1).requires_grad_(False).eval(),
+        scenario,
+        scheme,
+        clock=algorithm.clock,
+        geofence=algorithm.geofence,
+        learners=len(learners),
+    )

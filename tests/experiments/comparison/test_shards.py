@@ -16,11 +16,11 @@ from hyuav._support.errors import BusyError, InputError
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import parameters_of, training_episodes
 from hyuav.experiments.comparison.shards import Shard
-from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
+from hyuav.experiments.evaluation import EvaluationParameters, fly
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, Tracker
 from hyuav.experiments.train import train
-from hyuav.learning.policy import LearnedPolicy
+from hyuav.learning.policy import learned_policy
 from hyuav.learning.registry import PEER
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
@@ -59,17 +59,17 @@ def shard(optima: Optima, parent: Path, algorithm: str = "ddpg") -> Shard:
 def test_the_optima_are_kept_as_they_were_found(optima: Optima) -> None:
     found = solve_optimum(SCENARIO, resolution=EVALUATION.resolution)
     for scheme, optimum in found.items():
-        path = optima.policy(scheme, 6).module.get_buffer("path")
+        path = optima.policy(scheme, 6).get_buffer("path")
         assert np.array_equal(path, optimum.path)
-    assert len(optima.policy("relay", 8).module.get_buffer("path")) == 9
+    assert len(optima.policy("relay", 8).get_buffer("path")) == 9
     kept = pd.read_parquet(optima.file).query("num_slots == 6").groupby("scheme")["value"].first()
     assert kept.to_dict() == {scheme: optimum.value for scheme, optimum in found.items()}
 
 
 def test_a_training_is_evaluated_in_the_episodes_that_its_optimum_flies() -> None:
     training = Training(SCENARIO, [Learner("relay", 3)], parameters_of("ddpg"), TRAINING)
-    policy = LearnedPolicy(SCENARIO, parameters_of("ddpg"), training.best_weights)
-    totals = fly(SCENARIO, "re_ot", Policy(policy), training_episodes(TRAINING)).totals
+    policy = learned_policy(SCENARIO, parameters_of("ddpg"), training.best_weights)
+    totals = fly(SCENARIO, "re_ot", policy, training_episodes(TRAINING)).totals
     penalty = SCENARIO.off_map_penalty * totals["off_map"]
     flown = (totals["secrecy_sum_rate"] - penalty).mean()
     assert training.evaluate().reward.item() == pytest.approx(float(flown), rel=1e-5)
@@ -143,8 +143,8 @@ def test_a_shard_of_this_project_is_a_run(optima: Optima, tmp_path: Path) -> Non
     assert [file.name for file in (work.path / "checkpoints").iterdir()] == ["best.pt"]
     results = pd.read_parquet(work.path / "results.parquet")
     weights = RunDirectory(work.path).best_weights()
-    last = LearnedPolicy(SCENARIO, work.configuration.algorithm, weights, 3)
-    flights = fly(SCENARIO, "proposed", Policy(last), EVALUATION)
+    last = learned_policy(SCENARIO, work.configuration.algorithm, weights, [3])
+    flights = fly(SCENARIO, "proposed", last, EVALUATION)
     expected = float(flights.totals["secrecy_sum_rate"].mean())
     assert results["sum_rate"].iloc[3] == pytest.approx(expected, rel=1e-5)
 

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from hyuav import Scenario
-from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import EvaluationLoggerParameters, LoggerParameters, log_evaluation
 from hyuav.experiments.train import train
@@ -37,7 +37,7 @@ PIXEL = bytes.fromhex(
 
 def evaluated() -> Evaluation:
     parameters = EvaluationParameters(episodes=3, flights=2)
-    return evaluate(SCENARIO, "two_clusters", {"re_lt": [Policy(re_lt(SCENARIO))]}, parameters)
+    return evaluate(SCENARIO, "two_clusters", {"re_lt": re_lt(SCENARIO)}, parameters)
 
 
 def table(directory: Path, record: dict[str, Any], name: str) -> dict[str, Any]:

@@ -9,7 +9,6 @@ import torch
 
 from hyuav._support.errors import InputError
 from hyuav._support.files import read_parquet, write_durably
-from hyuav.experiments.evaluation import Policy
 from hyuav.experiments.schemes import OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import FlightPolicy, solve_horizons
@@ -61,7 +60,7 @@ class Optima:
         ]
         write_durably(self.file, pd.concat(flights, ignore_index=True).to_parquet())
 
-    def policy(self, rule: str, num_slots: int) -> Policy:
+    def policy(self, rule: str, num_slots: int) -> FlightPolicy:
         """The way to fly the best flight of a mode rule over a horizon.
 
         Raises:
@@ -70,7 +69,7 @@ class Optima:
         flights = self._flights()
         flight = flights[(flights["scheme"] == rule) & (flights["num_slots"] == num_slots)]
         path = torch.tensor(flight.sort_values("slot")[["x", "y"]].to_numpy()).unsqueeze(1)
-        return Policy(FlightPolicy(path, self.scenario))
+        return FlightPolicy(path, self.scenario)
 
     def _flights(self) -> pd.DataFrame:
         columns = ["scheme", "num_slots", "value", "standard_error", "slot", "x", "y"]

@@ -7,40 +7,16 @@ from typing import Any
 
 import gymnasium
 import pandas as pd
-from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase
-from torch import Tensor, nn
+from torch import nn
 
 from hyuav.experiments.comparison.peer import ddpg_model
 from hyuav.experiments.comparison.plan import training_episodes
-from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
+from hyuav.experiments.evaluation import EvaluationParameters, fly
 from hyuav.experiments.run_directory import RunConfiguration
 from hyuav.experiments.schemes import LEARNED
+from hyuav.learning.policy import Policy
 from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
-
-
-class Actor(TensorDictModuleBase):
-    """An actor of Stable-Baselines3 as a way to fly batches.
-
-    Reads ``observation`` (..., observed), writes ``action`` (..., 2) in [-1, 1].
-
-    Args:
-        actor: maps (B, observed) to (B, 2).
-    """
-
-    in_keys = ("observation",)
-    out_keys = ("action",)
-
-    def __init__(self, actor: nn.Module) -> None:
-        super().__init__()
-        self.actor = actor
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the action of each helper in the batch."""
-        observation = tensordict["observation"]
-        action: Tensor = self.actor(observation.flatten(0, -2))
-        return tensordict.set("action", action.reshape(*observation.shape[:-1], 2))
 
 
 def train(
@@ -89,16 +65,16 @@ def _train(
         seed=learner.seed,
         device="cpu",
     )
-    actor = Actor(model.policy.actor)
-    rows, episode, best, best_weights = [], 0, -math.inf, actor.state_dict()
+    policy = Policy(model.policy.actor, scenario, learner.scheme)
+    rows, episode, best, best_weights = [], 0, -math.inf, policy.state_dict()
     while episode < training.num_episodes:
         episodes = min(training.evaluation_every, training.num_episodes - episode)
         slots = episodes * scenario.num_slots
         model.learn(slots, reset_num_timesteps=False, log_interval=None)
         episode += episodes
-        sum_rate, reward = _earned(scenario, learner.scheme, actor, training_episodes(training))
+        sum_rate, reward = _earned(policy, training_episodes(training))
         if reward > best:
-            best, best_weights = reward, copy.deepcopy(actor.state_dict())
+            best, best_weights = reward, copy.deepcopy(policy.state_dict())
         rows.append(
             {
                 "episode": episode,
@@ -108,15 +84,15 @@ def _train(
                 "sum_rate": sum_rate,
             }
         )
-    actor.load_state_dict(best_weights)
-    return rows, _earned(scenario, learner.scheme, actor, evaluation)[0]
+    policy.load_state_dict(best_weights)
+    return rows, _earned(policy, evaluation)[0]
 
 
-def _earned(
-    scenario: Scenario, rule: str, actor: Actor, episodes: EvaluationParameters
-) -> tuple[float, float]:
+def _earned(policy: Policy, episodes: EvaluationParameters) -> tuple[float, float]:
     """Means over the episodes in bps/Hz: the secrecy sum-rate, and the reward with penalties."""
-    totals = fly(scenario, LEARNED[rule], Policy(actor), episodes).totals
+    scenario: Scenario = policy.environment["scenario"]
+    scheme = LEARNED[policy.environment["scheme"]]
+    totals = fly(scenario, scheme, policy, episodes).totals
     sum_rate = totals["secrecy_sum_rate"]
     reward = sum_rate - scenario.off_map_penalty * totals["off_map"]
     return float(sum_rate.mean()), float(reward.mean())

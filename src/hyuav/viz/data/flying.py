@@ -8,10 +8,16 @@ from functools import lru_cache
 from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection
-from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
-from hyuav.experiments.policies import learned_policies, learned_policy, straight_policies
+from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
+from hyuav.experiments.policies import (
+    Policies,
+    learned_policies,
+    require_nodes,
+    straight_policies,
+)
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
+from hyuav.learning.policy import Policy
 from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
 from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve_optimum
@@ -116,7 +122,7 @@ def flown(
         InputError: as :func:`resolution`, or the checkpoint does not fit the scenario.
     """
     best = optimum(scenario, rule, fine=fine)
-    policies = {OPTIMA[rule]: [Policy(FlightPolicy(best.path, scenario))]}
+    policies: Policies = {OPTIMA[rule]: [FlightPolicy(best.path, scenario)]}
     if checkpoint is not None:
         policies[LEARNED[rule]] = [_policy(scenario, checkpoint)]
     return evaluate(scenario, "changed", policies, EPISODES)
@@ -140,11 +146,9 @@ def _require_size(scenario: Scenario) -> None:
 def _policy(scenario: Scenario, checkpoint: Checkpoint) -> Policy:
     _require_size(scenario)
     configuration, weights = _saved(checkpoint.run, checkpoint.stamp)
-    trained = configuration.scenario.num_ues
-    if scenario.num_ues != trained:
-        accepted = f"{trained}, for which the checkpoint was trained"
-        raise InputError(rejection("number of UEs", scenario.num_ues, accepted))
-    return learned_policy(scenario, configuration.algorithm, weights, [checkpoint.index])
+    policy = configuration.policy(weights, [checkpoint.index])
+    require_nodes(policy, scenario)
+    return policy
 
 
 @lru_cache(maxsize=8)
@@ -168,9 +172,8 @@ def fly_now(run: RunDirectory, name: str) -> tuple[Scenario, Evaluation]:
     """
     configuration = run.configuration()
     scenario = configuration.scenario
-    horizons = [learner.num_slots or scenario.num_slots for learner in configuration.learners]
-    if scenario.num_slots not in horizons:
-        scenario = dataclasses.replace(scenario, num_slots=max(horizons))
+    if scenario.num_slots not in configuration.horizons:
+        scenario = dataclasses.replace(scenario, num_slots=max(configuration.horizons))
     policies = learned_policies([run], scenario)
     policies |= straight_policies(scenario)[0]
     return scenario, evaluate(scenario, name, policies, QUICK)
