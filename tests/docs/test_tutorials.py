@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted((ROOT / "docs" / "tutorials").glob("*.md")), ROOT / "docs" / "index.md"]
 
-OPTIONAL = {"stable_baselines3": "stable_baselines3"}
+OPTIONAL = {"stable_baselines3": "stable_baselines3", "policy": "onnxruntime"}
 """What a page needs beyond the library."""
 
 _FENCE = re.compile(r'^```(python|sh)(?: title="([\w.]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
@@ -81,6 +81,7 @@ def test_every_tutorial_has_something_to_run() -> None:
     assert {page.stem for page in PAGES} >= {
         "scenario",
         "algorithm",
+        "policy",
         "stable_baselines3",
         "run_data",
     }

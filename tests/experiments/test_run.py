@@ -175,7 +175,7 @@ def test_a_gymnasium_environment_without_the_clock_is_refused(run: Run) -> None:
         run.policy.predict(env.reset(seed=0)[0])
 
 
-def test_an_actor_of_stable_baselines3_becomes_a_policy() -> None:
+def test_an_actor_of_stable_baselines3_becomes_a_policy(tmp_path: Path) -> None:
     td3 = pytest.importorskip("stable_baselines3").TD3
     options: dict[str, Any] = {"scenario": "two_clusters", "clock": True, "geofence": True}
     model = td3("MlpPolicy", gymnasium.make("hyuav/SecureOffloading-v0", **options), device="cpu")
@@ -185,3 +185,7 @@ def test_an_actor_of_stable_baselines3_becomes_a_policy() -> None:
         flown = env.rollout(3, policy)
     expected, _ = model.predict(flown["observation"].flatten(0, 2).numpy(), deterministic=True)
     np.testing.assert_allclose(policy.act(flown["observation"]).flatten(0, 2), expected, atol=1e-6)
+    policy.export(tmp_path / "policy.pt2")
+    observed = torch.rand(5, 16)
+    loaded = torch.export.load(tmp_path / "policy.pt2").module()
+    torch.testing.assert_close(loaded(observed), policy.act(observed))

@@ -109,6 +109,7 @@ def load(path: str | Path) -> Run:
     Example:
         >>> run = load("runs/NAME")
         >>> flights = run.make_env(batch_size=64, seed=0).rollout(20, run.policy)
+        >>> run.policy.export("policy.onnx")
     """
     directory = RunDirectory(path)
     return Run(directory, directory.configuration())

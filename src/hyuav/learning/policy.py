@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,6 +19,7 @@ from hyuav.envs.arguments import as_scenario
 from hyuav.envs.observation import ObservationLayout
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
+from hyuav.learning.export import export
 from hyuav.learning.weights import load_weights, select_learners
 from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import Scenario
@@ -180,6 +182,24 @@ class Policy(TensorDictModuleBase):
             InputError: as :func:`hyuav.make_env`.
         """
         return make_env(**{**self.environment, **options})
+
+    def export(self, path: str | Path) -> None:
+        """Write the network to a file, in the format that the suffix tells.
+
+        ``.onnx`` for ONNX Runtime and others, ``.pt2`` for ``torch.export.load``, ``.pt`` for
+        ``torch.jit.load``. Its input is ``observation`` (batch, observed) float32, its output
+        ``action`` (batch, 2 H); of several learners (N, batch, ...). Beside it stands
+        :attr:`environment` in JSON, under the name ``environment``.
+
+        Args:
+            path: of the file; one that is there is replaced.
+
+        Raises:
+            InputError: another suffix, a place that cannot be written to, or what writes ONNX is
+                not installed.
+        """
+        example = torch.zeros(*self._rows, 2, self._layout.size, dtype=torch.float32)
+        export(self.network, path, example, self.environment)
 
     @property
     def _rows(self) -> tuple[int, ...]:

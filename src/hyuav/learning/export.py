@@ -1,0 +1,108 @@
+"""Networks as files that fly without this library: ONNX, and PyTorch's own two formats."""
+
+import copy
+import io
+import json
+import logging
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from hyuav._support.errors import InputError, cause, rejection
+from hyuav._support.files import write_durably
+from hyuav._support.machine import require_installed
+from hyuav._support.parameters import Parameters
+
+INPUT, OUTPUT = "observation", "action"
+
+ENVIRONMENT = "environment"
+"""The name under which a file tells what environment the network needs."""
+
+
+def export(
+    network: nn.Module, path: str | Path, example: Tensor, environment: Mapping[str, Any]
+) -> None:
+    """Write a network to a file, in the format that the suffix tells.
+
+    The network itself stays as it is and where it is; what is written computes in float32.
+
+    Args:
+        network: maps (..., K, observed) to (..., K, 2 H).
+        path: of the file: ``.onnx``, ``.pt2`` (torch.export) or ``.pt`` (TorchScript).
+        example: of its input, float32; in the file, K may be any number.
+        environment: kept beside it in JSON.
+
+    Raises:
+        InputError: another suffix, a place that cannot be written to, or what writes ONNX is not
+            installed.
+    """
+    if not isinstance(path, str | Path) or Path(path).suffix not in ENCODERS:
+        accepted = f"a file name that ends in {', '.join(ENCODERS)}"
+        raise InputError(rejection("path", path if isinstance(path, str) else str(path), accepted))
+    encode, told = ENCODERS[Path(path).suffix], json.dumps(environment, default=Parameters.to_dict)
+    own = copy.deepcopy(network).to(example).requires_grad_(False).eval()
+    with _quiet():
+        content = encode(own, example, told)
+    try:
+        write_durably(Path(path), content)
+    except OSError as error:
+        accepted = f"a file that can be written ({cause(error)})"
+        raise InputError(rejection("path", str(path), accepted)) from None
+
+
+def _dynamic(example: Tensor) -> tuple[dict[int, torch.export.Dim]]:
+    """Which axis of the input may have any length."""
+    return ({example.ndim - 2: torch.export.Dim("batch")},)
+
+
+def _onnx(network: nn.Module, example: Tensor, environment: str) -> bytes:
+    require_installed(("onnx", "onnxscript"), "export")
+    program = torch.onnx.export(
+        network,
+        (example,),
+        dynamic_shapes=_dynamic(example),
+        input_names=[INPUT],
+        output_names=[OUTPUT],
+        dynamo=True,
+        verbose=False,
+    )
+    assert program is not None
+    program.model.metadata_props[ENVIRONMENT] = environment
+    return program.model_proto.SerializeToString()
+
+
+def _pt2(network: nn.Module, example: Tensor, environment: str) -> bytes:
+    file = io.BytesIO()
+    program = torch.export.export(network, (example,), dynamic_shapes=_dynamic(example))
+    torch.export.save(program, file, extra_files={ENVIRONMENT: environment})
+    return file.getvalue()
+
+
+def _torchscript(network: nn.Module, example: Tensor, environment: str) -> bytes:
+    file = io.BytesIO()
+    traced = torch.jit.trace(network, (example,))  # which scripting cannot follow
+    torch.jit.save(traced, file, _extra_files={ENVIRONMENT: environment})
+    return file.getvalue()
+
+
+ENCODERS = {".onnx": _onnx, ".pt2": _pt2, ".pt": _torchscript}
+"""By the suffix of the file."""
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Let PyTorch tell nothing of libraries that it misses, and of what it will give up."""
+    logger = logging.getLogger("torch.onnx")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.setLevel(level)
