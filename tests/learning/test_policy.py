@@ -111,6 +111,21 @@ def test_an_observation_of_any_kind_is_answered_in_the_same_kind(name: str) -> N
     torch.testing.assert_close(half, expected, atol=0.1, rtol=0.1)
 
 
+@EVERY
+def test_a_policy_keeps_to_the_devices_of_its_weights_and_of_what_is_observed(
+    name: str, tmp_path: Path
+) -> None:
+    algorithm = ALGORITHMS[name](hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(2, SCENARIO).loss)
+    with torch.device("meta"):  # which holds no numbers
+        policy = learned_policy(SCENARIO, algorithm, weights, [1])
+        env = policy.make_env(batch_size=(3,), device="cpu", seed=0)
+        flown = env.rollout(2, policy)
+        policy.act(flown["observation"].numpy())
+        policy.export(tmp_path / "policy.pt")
+    assert flown["action"].isfinite().all()
+
+
 def test_the_callers_default_type_changes_nothing() -> None:
     algorithm = ALGORITHMS["sac_robust"](hidden_sizes=(8,))
     weights = copy_weights(algorithm.build(1, SCENARIO).loss)
@@ -168,9 +183,17 @@ def test_a_wrong_observation_is_answered_in_one_line(kind: str) -> None:
         )
 
 
-def test_entries_without_an_observation_are_refused() -> None:
-    with pytest.raises(InputError, match="observation = None: expected"):
-        untrained("ddpg")(TensorDict(position=torch.zeros(3, 1, 2), batch_size=(3,)))
+@pytest.mark.parametrize(
+    ("entries", "line"),
+    [
+        ({"position": torch.zeros(3, 1, 2)}, "observation = None: expected"),
+        ({"observation": torch.full((3, 15), torch.nan)}, r"observation = \[\[nan, "),
+        ({"observation": TensorDict(batch_size=(3,))}, "observation = None: expected"),
+    ],
+)
+def test_entries_that_do_not_fit_are_refused(entries: dict[str, Any], line: str) -> None:
+    with pytest.raises(InputError, match=line):
+        untrained("ddpg")(TensorDict(entries, batch_size=(3,)))
 
 
 def test_an_environment_without_the_clock_is_refused() -> None:

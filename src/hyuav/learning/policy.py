@@ -135,16 +135,13 @@ class Policy(TensorDictModuleBase):
         """
         if isinstance(observation, TensorDictBase):
             self._require_environment(observation)
-            return observation.set("action", self._act(observation.get("observation", None)))
+            return observation.set("action", self.forward(observation.get("observation", None)))
         if isinstance(observation, np.ndarray):
             if observation.dtype.kind != "f":
                 raise InputTypeError(rejection("observation", observation.dtype, self._accepted))
             widest = np.array(observation, dtype=np.float64)  # in this machine's byte order
             return self.forward(torch.from_numpy(widest)).numpy(force=True)
-        action = self._act(observation)
-        if not torch.compiler.is_compiling() and not observation.to(action).isfinite().all():
-            raise InputError(rejection("observation", observation.tolist(), self._accepted))
-        return action
+        return self._act(observation)
 
     @torch.no_grad()
     def act(self, observation: Observed) -> Observed:
@@ -198,7 +195,8 @@ class Policy(TensorDictModuleBase):
             InputError: another suffix, a place that cannot be written to, or what writes ONNX is
                 not installed.
         """
-        example = torch.zeros(*self._rows, 2, self._layout.size, dtype=torch.float32)
+        shape = (*self._rows, 2, self._layout.size)
+        example = torch.zeros(shape, dtype=torch.float32, device="cpu")
         export(self.network, path, example, self.environment)
 
     @property
@@ -225,7 +223,7 @@ class Policy(TensorDictModuleBase):
             warnings.warn(
                 "the environment turned the helper back at the map's edge, but the policy was "
                 "trained with geofence=True: policy.make_env() makes such an environment",
-                stacklevel=4,
+                stacklevel=2,
             )
 
     def _act(self, observation: Tensor) -> Tensor:
@@ -238,7 +236,10 @@ class Policy(TensorDictModuleBase):
         if shape[-1:] != (size,) or shape[: len(rows)] != rows or len(shape) <= len(rows):
             raise InputError(rejection("observation", tuple(shape), self._accepted))
         like = next(self.network.parameters(), observation)
-        action: Tensor = self.network(observation.to(like).reshape(*rows, -1, size))
+        observed = observation.to(like)
+        if not torch.compiler.is_compiling() and not observed.isfinite().all():
+            raise InputError(rejection("observation", observation.tolist(), self._accepted))
+        action: Tensor = self.network(observed.reshape(*rows, -1, size))
         return action.reshape(*shape[:-1], self._layout.action_size).to(observation.device)
 
 
@@ -293,10 +294,12 @@ def learned_policy(
     Raises:
         InputError: the weights do not fit the algorithm or the number of UEs.
     """
-    built = algorithm.build(len(learners), scenario)
     own = select_learners(weights, learners)
+    like = next(iter(own.values()))  # rather than the default device and type of tensors
+    with like.device:
+        built = algorithm.build(len(learners), scenario)
     load_weights(built.loss, own)
-    actor = built.actor.to(next(iter(own.values())).dtype)  # not the default type of tensors
+    actor = built.actor.to(like.dtype)
     return Policy(
         ActorNetwork(actor, learner_axis=len(learners) == 1).requires_grad_(False).eval(),
         scenario,
