@@ -8,7 +8,7 @@ from torch import Tensor
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.evaluation import Policy
-from hyuav.experiments.run_directory import RunDirectory
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.policy import LearnedPolicy
@@ -38,15 +38,31 @@ def learned_policy(
     return Policy(module, len(learners), algorithm.clock, algorithm.geofence)
 
 
+def require_num_ues(trained: RunConfiguration, scenario: Scenario) -> None:
+    """Accept a scenario that a training's actors can fly.
+
+    Raises:
+        InputError: they observe another number of UEs than it has.
+    """
+    if scenario.num_ues != trained.scenario.num_ues:
+        accepted = f"{trained.scenario.num_ues}, for which the checkpoint was trained"
+        raise InputError(rejection("number of UEs", scenario.num_ues, accepted))
+
+
 def learned_policies(
-    runs: Sequence[RunDirectory], scenario: Scenario, schemes: Mapping[str, str] = LEARNED
+    runs: Sequence[RunDirectory],
+    scenario: Scenario,
+    schemes: Mapping[str, str] = LEARNED,
+    *,
+    num_slots: int | None = None,
 ) -> dict[str, list[Policy]]:
-    """The best actors of trainings for the scenario's horizon, as Proposed, Re-OT and Ja-OT.
+    """The best actors of trainings for a horizon, as Proposed, Re-OT and Ja-OT.
 
     Args:
         runs: of the trainings.
         scenario: to fly.
         schemes: that the actors count as, by mode rule.
+        num_slots: horizon that the actors were trained for; the scenario's where it is None.
 
     Raises:
         InputError: a run or its checkpoint cannot be read, its actors observe another number of
@@ -54,20 +70,22 @@ def learned_policies(
     """
     policies: dict[str, list[Policy]] = {}
     horizons: set[int] = set()
+    wanted = num_slots or scenario.num_slots
     for run in runs:
         configuration, weights = run.trained()
+        require_num_ues(configuration, scenario)
         by_scheme: dict[str, list[int]] = {}
         for index, learner in enumerate(configuration.learners):
-            horizon = learner.num_slots or configuration.scenario.num_slots
+            horizon = learner.horizon(configuration.scenario)
             horizons.add(horizon)
-            if horizon == scenario.num_slots:
+            if horizon == wanted:
                 by_scheme.setdefault(schemes[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
             policy = learned_policy(scenario, configuration.algorithm, weights, indices)
             policies.setdefault(scheme, []).append(policy)
     if not policies:
         accepted = f"what learners were trained for, {', '.join(map(str, sorted(horizons)))}"
-        raise InputError(rejection("num_slots", scenario.num_slots, accepted))
+        raise InputError(rejection("num_slots", wanted, accepted))
     return policies
 
 

@@ -59,7 +59,7 @@ class RunConfiguration:
         return cls(
             scenario_name,
             scenario,
-            _learners(values["learners"], scenario.num_slots),
+            _learners(values["learners"], scenario),
             algorithm_name,
             algorithm,
             TrainingParameters.from_dict(mapping("training", values["training"])),
@@ -74,6 +74,14 @@ class RunConfiguration:
             "training": self.training.to_dict(),
         }
 
+    @property
+    def trained_scenario(self) -> Scenario:
+        """The scenario, over its learners' longest horizon where none of them has its own."""
+        horizons = [learner.horizon(self.scenario) for learner in self.learners]
+        if self.scenario.num_slots in horizons:
+            return self.scenario
+        return dataclasses.replace(self.scenario, num_slots=max(horizons))
+
     def new_training(self, device: str | None = None) -> Training:
         """The training that is configured, of which nothing is done yet.
 
@@ -86,12 +94,11 @@ class RunConfiguration:
 Learners = Annotated[tuple[Learner, ...], Field(min_length=1, description="a list of learners")]
 
 
-def _learners(values: object, num_slots: int) -> tuple[Learner, ...]:
-    """Learners that differ, where those without a horizon of their own have ``num_slots``."""
+def _learners(values: object, scenario: Scenario) -> tuple[Learner, ...]:
+    """Learners that differ, where those without a horizon of their own have the scenario's."""
     learners: tuple[Learner, ...] = checked(Learners, "learners", values)
     resolved = [
-        dataclasses.replace(learner, num_slots=learner.num_slots or num_slots)
-        for learner in learners
+        dataclasses.replace(learner, num_slots=learner.horizon(scenario)) for learner in learners
     ]
     twice = [learner for learner, times in Counter(resolved).items() if times > 1]
     if twice:

@@ -65,6 +65,10 @@ class Learner(Parameters):
     num_slots: Count | None = parameter(None, symbol="T")
     """The horizon; the scenario's where it is None."""
 
+    def horizon(self, scenario: Scenario) -> int:
+        """T: its own, or else the scenario's."""
+        return self.num_slots or scenario.num_slots
+
 
 class Cohort:
     """N learners that share a horizon and nothing else.

@@ -157,7 +157,7 @@ class Training:
     @property
     def horizons(self) -> tuple[int, ...]:
         """T of each learner."""
-        return tuple(learner.num_slots or self.scenario.num_slots for learner in self.learners)
+        return tuple(learner.horizon(self.scenario) for learner in self.learners)
 
     @property
     def episode(self) -> int:

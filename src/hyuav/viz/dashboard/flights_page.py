@@ -109,8 +109,8 @@ def _flown_now(index: RunIndex, name: str) -> tuple[Scenario, pd.DataFrame]:
         "Learner", range(len(labels)), format_func=labels.__getitem__, key="flown_learner"
     )
     learner = learners[number]
-    horizon = learner.num_slots or configuration.scenario.num_slots
-    scenario = dataclasses.replace(configuration.scenario, num_slots=horizon)
+    own = configuration.scenario
+    scenario = dataclasses.replace(own, num_slots=learner.horizon(own))
     checkpoint = checkpoint_of(index, name, number)
     return scenario, flown_by(scenario, learner.scheme, checkpoint).flights
 

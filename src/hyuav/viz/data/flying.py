@@ -1,6 +1,5 @@
 """Flights that nobody has evaluated: of trained weights, and of the optimum beside them."""
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,7 +8,12 @@ from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
-from hyuav.experiments.policies import learned_policies, learned_policy, straight_policies
+from hyuav.experiments.policies import (
+    learned_policies,
+    learned_policy,
+    require_num_ues,
+    straight_policies,
+)
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.train import Learner
@@ -60,8 +64,7 @@ def checkpoint_of(index: RunIndex, name: str, learner: int) -> Checkpoint:
 
 def learner_label(learner: Learner, scenario: Scenario) -> str:
     """What tells a run's learners apart."""
-    horizon = learner.num_slots or scenario.num_slots
-    return f"{learner.scheme}, T = {horizon}, seed {learner.seed}"
+    return f"{learner.scheme}, T = {learner.horizon(scenario)}, seed {learner.seed}"
 
 
 def resolution(scenario: Scenario, *, fine: bool) -> float:
@@ -140,10 +143,7 @@ def _require_size(scenario: Scenario) -> None:
 def _policy(scenario: Scenario, checkpoint: Checkpoint) -> Policy:
     _require_size(scenario)
     configuration, weights = _saved(checkpoint.run, checkpoint.stamp)
-    trained = configuration.scenario.num_ues
-    if scenario.num_ues != trained:
-        accepted = f"{trained}, for which the checkpoint was trained"
-        raise InputError(rejection("number of UEs", scenario.num_ues, accepted))
+    require_num_ues(configuration, scenario)
     return learned_policy(scenario, configuration.algorithm, weights, [checkpoint.index])
 
 
@@ -166,11 +166,7 @@ def fly_now(run: RunDirectory, name: str) -> tuple[Scenario, Evaluation]:
     Raises:
         InputError: the weights cannot be read, or do not fit.
     """
-    configuration = run.configuration()
-    scenario = configuration.scenario
-    horizons = [learner.num_slots or scenario.num_slots for learner in configuration.learners]
-    if scenario.num_slots not in horizons:
-        scenario = dataclasses.replace(scenario, num_slots=max(horizons))
+    scenario = run.configuration().trained_scenario
     policies = learned_policies([run], scenario)
     policies |= straight_policies(scenario)[0]
     return scenario, evaluate(scenario, name, policies, QUICK)
