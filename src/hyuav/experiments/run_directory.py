@@ -15,7 +15,7 @@ from pydantic import Field
 from torch import Tensor
 
 from hyuav._support.errors import BusyError, InputError, rejection
-from hyuav._support.files import create_durably, require_writable
+from hyuav._support.files import create_durably, require_writable, write_durably
 from hyuav._support.parameters import checked, mapping
 from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import read_metrics
@@ -81,6 +81,15 @@ class RunConfiguration:
         if self.scenario.num_slots in horizons:
             return self.scenario
         return dataclasses.replace(self.scenario, num_slots=max(horizons))
+
+    def with_episodes(self, num_episodes: int) -> "RunConfiguration":
+        """The same for another number of episodes.
+
+        Raises:
+            InputError: an unacceptable number.
+        """
+        training = dataclasses.replace(self.training, num_episodes=num_episodes)
+        return dataclasses.replace(self, training=training)
 
     def new_training(self, device: str | None = None) -> Training:
         """The training that is configured, of which nothing is done yet.
@@ -173,7 +182,7 @@ class RunDirectory:
                 save_checkpoint(run.last_checkpoint, "training", first_checkpoint)
             create_durably(run.config_file, content.encode())
         except FileExistsError:
-            accepted = "one without a run in it"
+            accepted = "one without a run in it (train resume=DIRECTORY goes on with one)"
             raise InputError(rejection("run directory", str(path), accepted)) from None
         except OSError as error:
             accepted = f"a writable place ({error.strerror})"
@@ -232,6 +241,15 @@ class RunDirectory:
         except InputError as error:
             accepted = f"a run directory with a config.yaml ({error})"
             raise InputError(rejection("run", str(self.path), accepted)) from None
+
+    def change(self, configuration: RunConfiguration) -> None:
+        """Replace the configuration in ``config.yaml``; all else that was asked for stays.
+
+        Raises:
+            OSError: it cannot be written; then the former one is still there.
+        """
+        content = OmegaConf.to_yaml({**self.request(), **configuration.to_dict()})
+        write_durably(self.config_file, content.encode())
 
     def best_weights(self) -> dict[str, Tensor]:
         """The best weights so far of all learners.
