@@ -331,10 +331,28 @@ def test_going_on_into_the_runs_own_directory_is_refused_and_loses_nothing(
 ) -> None:
     call("train", "hydra.run.dir=base", *SHORT)
     before = sorted((tmp_path / "base").rglob("*"))
-    accepted = "expected nothing beside it but device=, threads= and logger.NAME="
+    accepted = "device=, threads=, logger.NAME= and training.num_episodes=, not hydra.run.dir"
+    hint = '(warm_start="base" begins a new training with its weights)'
     line = refusal("train", "resume=base", "hydra.run.dir=base")
-    assert line == f"error: resume = 'base': {accepted}, not hydra.run.dir\n"
+    assert line == f"error: resume = 'base': expected nothing beside it but {accepted} {hint}\n"
     assert sorted((tmp_path / "base").rglob("*")) == before
+
+
+def test_a_finished_training_goes_on_for_more_episodes(
+    call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call("train", "hydra.run.dir=run", "training.compile=never", *SHORT)
+    capsys.readouterr()
+    call("train", "resume=run", "training.num_episodes=6")
+    assert "run: this training goes on after episode 4 of 6\n" in capsys.readouterr().out
+    run = RunDirectory(tmp_path / "run")
+    assert run.metrics()["episode"].tolist() == [1, 2, 3, 4, 5, 6]
+    assert run.configuration().training.num_episodes == 6
+    accepted = "expected at least the 6 episodes that are trained already"
+    line = refusal("train", "resume=run", "training.num_episodes=5")
+    assert line == f"error: num_episodes = 5: {accepted}\n"
+    line = refusal("train", "resume=run", "training.num_episodes=8", "training.batch_size=4")
+    assert "not training.batch_size (warm_start=" in line
 
 
 def test_a_mistake_on_the_command_line_ends_the_process_with_status_2(tmp_path: Path) -> None:

@@ -38,6 +38,7 @@ from hyuav._support.interruption import interrupted_by_sigterm
 from hyuav._support.parameters import Parameters, mapping, refuse_unknown, unknown_field
 from hyuav._support.start import loaded, program
 from hyuav.experiments.configuration_files import read_files_as_data
+from hyuav.experiments.elsewhere import AS_TRAINED, as_trained
 from hyuav.experiments.own_algorithms import run_named, with_own
 from hyuav.experiments.usage import usage
 from hyuav.learning.registry import ALGORITHMS, file_name, run_own
@@ -52,21 +53,25 @@ Config = dict[str, Any]
 Record = TypeVar("Record", bound=Parameters)
 
 
-def register(groups: Iterable[str]) -> None:
+def register(groups: Mapping[str, str]) -> None:
     """Offer the presets and the algorithms as the groups ``scenario`` and ``algorithm``.
 
     Args:
-        groups: that are wanted. Where one is not, its name is free for a plain entry.
+        groups: that are wanted, and the member chosen by default. Where one is not, its name is
+            free for a plain entry.
     """
     store = ConfigStore.instance()
-    members: dict[str, dict[str, tuple[str, Parameters]]] = {
-        "scenario": {name: (name, Scenario.preset(name)) for name in PRESETS},
-        "algorithm": {file_name(name): (name, kind()) for name, kind in ALGORITHMS.items()},
+    members: dict[str, dict[str, Config]] = {
+        "scenario": {name: {"name": name, **Scenario.preset(name).to_dict()} for name in PRESETS},
+        "algorithm": {
+            file_name(name): {"name": name, **kind().to_dict()} for name, kind in ALGORITHMS.items()
+        },
     }
+    if groups.get("scenario") == AS_TRAINED:
+        members["scenario"][AS_TRAINED] = as_trained()
     for group, known in members.items():
         store.repo.pop(group, None)  # with the files of an earlier call
-        for member, (name, parameters) in known.items() if group in groups else ():
-            node = {"name": name, **parameters.to_dict()}
+        for member, node in known.items() if group in groups else ():
             store.store(group=group, name=member, node=node)
 
 

@@ -65,6 +65,10 @@ class Learner(Parameters):
     num_slots: Count | None = parameter(None, symbol="T")
     """The horizon; the scenario's where it is None."""
 
+    def horizon(self, scenario: Scenario) -> int:
+        """T: its own, or else the scenario's."""
+        return self.num_slots or scenario.num_slots
+
 
 class Cohort:
     """N learners that share a horizon and nothing else.
@@ -262,18 +266,20 @@ class Cohort:
         )
         return fly_noise_free(env, self.algorithm, self._parameters.reward_scale)
 
-    def keep_best(self, episodes: int, seed: int) -> NoiseFreeReturn:
+    def keep_best(self, episodes: int, seed: int, *, noted: bool = True) -> NoiseFreeReturn:
         """Evaluate; where a learner never earned more, its weights are the best.
 
         Args:
             episodes: flown by each learner.
             seed: of the fading.
+            noted: whether a guide takes note of where the actors fly.
         """
         earned, positions = self.evaluate(episodes, seed)
         better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
         self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
         replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
-        self.algorithm.guide.end_evaluation(positions)
+        if noted:
+            self.algorithm.guide.end_evaluation(positions)
         return earned
 
     def state_dict(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import pandas as pd
 
 from hyuav._support.errors import InputError
 from hyuav.experiments.comparison.tables import label
+from hyuav.experiments.elsewhere import HORIZONS
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, Evaluation
 from hyuav.experiments.metrics import readable_metrics
 from hyuav.experiments.run_directory import RunDirectory, named_scenario
@@ -26,13 +27,8 @@ from hyuav.viz.data.reading import (
 )
 from hyuav.viz.data.schemes import COMPARED
 
-AS_IN_PAPER, HORIZONS = "as_in_paper", "horizons"
-"""Directories within a main job's run: the paper's own algorithm, and other horizons."""
-
-
-def horizon_directory(run: RunDirectory, num_slots: int) -> Path:
-    """Where the evaluation over another horizon than the scenario's own is kept."""
-    return run.path / HORIZONS / f"T{num_slots}"
+AS_IN_PAPER = "as_in_paper"
+"""Directory of the paper's own algorithm within a main job's run."""
 
 
 def evaluation_directories(directory: Path) -> list[Path]:
@@ -49,7 +45,7 @@ class FinishedRun:
 
     def __init__(self, run: RunDirectory) -> None:
         self.run = run
-        self.scenario: Scenario = run.configuration().scenario
+        self.scenario: Scenario = run.configuration().trained_scenario
 
     @cached_property
     def flights(self) -> pd.DataFrame:
