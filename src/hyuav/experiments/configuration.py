@@ -39,9 +39,9 @@ from hyuav._support.parameters import Parameters, mapping, refuse_unknown, unkno
 from hyuav._support.start import loaded, program
 from hyuav.experiments.configuration_files import read_files_as_data
 from hyuav.experiments.own_algorithms import run_named, with_own
+from hyuav.experiments.scenarios import NAMES, offered
 from hyuav.experiments.usage import usage
 from hyuav.learning.registry import ALGORITHMS, file_name, run_own
-from hyuav.physics.scenario import PRESETS, Scenario
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
 """In the pattern of a run's directory, when the command was called."""
@@ -53,20 +53,21 @@ Record = TypeVar("Record", bound=Parameters)
 
 
 def register(groups: Iterable[str]) -> None:
-    """Offer the presets and the algorithms as the groups ``scenario`` and ``algorithm``.
+    """Offer presets and layouts as the group ``scenario``, the algorithms as ``algorithm``.
 
     Args:
         groups: that are wanted. Where one is not, its name is free for a plain entry.
     """
     store = ConfigStore.instance()
-    members: dict[str, dict[str, tuple[str, Parameters]]] = {
-        "scenario": {name: (name, Scenario.preset(name)) for name in PRESETS},
-        "algorithm": {file_name(name): (name, kind()) for name, kind in ALGORITHMS.items()},
+    members: dict[str, dict[str, Config]] = {
+        "scenario": {name: {"name": name, **offered(name)} for name in NAMES},
+        "algorithm": {
+            file_name(name): {"name": name, **kind().to_dict()} for name, kind in ALGORITHMS.items()
+        },
     }
     for group, known in members.items():
         store.repo.pop(group, None)  # with the files of an earlier call
-        for member, (name, parameters) in known.items() if group in groups else ():
-            node = {"name": name, **parameters.to_dict()}
+        for member, node in known.items() if group in groups else ():
             store.store(group=group, name=member, node=node)
 
 
