@@ -74,11 +74,12 @@ def test_the_line_names_field_value_and_what_would_be_needed() -> None:
 @pytest.mark.parametrize("kept", [True, False])
 def test_what_is_said_to_earn_nothing_earns_nothing_and_what_would_do_does(*, kept: bool) -> None:
     needed = 0.1 if kept else 0.0999
-    near = dataclasses.replace(ONE_UE, ue_energy_budget=needed, eavesdropper_positions=(20.0, 60.0))
+    elsewhere = ((20.0, 60.0),)
+    near = dataclasses.replace(ONE_UE, ue_energy_budget=needed, eavesdropper_positions=elsewhere)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env = make_env(near, "jamming", batch_size=(64,), seed=0)
-    start = env.reset().set("position", torch.tensor([[20.0, 60.0]]).expand(64, 1, 2))
+    start = env.reset().set("position", torch.tensor(elsewhere).expand(64, 1, 2))
     start["action"] = torch.zeros(64, 2)
     assert bool((env.step(start)["next", "reward"] > 0).any()) == kept
 
