@@ -22,6 +22,7 @@ from hyuav._support.parameters import OrOne, Parameters, declared
 from hyuav._support.parameters import accepted as words
 from hyuav.learning.registry import ALGORITHMS, BUILT_IN
 from hyuav.learning.train import Learner
+from hyuav.physics.families import LAYOUTS
 from hyuav.physics.scenario import PRESETS, Scenario
 
 RECIPES = Path(__file__).parents[2] / "recipes"
@@ -57,6 +58,14 @@ def configuration_page() -> str:
         f"{names}.",
         table(Scenario),
     ]
+    for layout, kind in LAYOUTS.items():
+        draw = f"hyuav.physics.layout.{layout}"
+        parts += [
+            f"## `scenario={layout}`",
+            f"The fields of `scenario`, but that [`{draw}`][{draw}] draws `ue_positions`, by "
+            f"`seed` (0)" + (" and:" if fields(kind) else "."),
+            *([table(kind)] if fields(kind) else []),
+        ]
     for name in BUILT_IN:
         parameters = ALGORITHMS[name]
         path = f"{parameters.__module__}.{parameters.__qualname__}"

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from omegaconf import OmegaConf
 
-from hyuav import Scenario
+from hyuav import Scenario, clusters
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.learning.ddpg import DDPG
 from recipe_calls import TINY, Call, Refusal
@@ -68,6 +68,20 @@ def test_a_saved_scenario_is_chosen_by_the_name_of_its_file(call: Call, tmp_path
     configuration = RunDirectory(run).configuration()
     assert configuration.scenario_name == "campus"
     assert configuration.scenario == dataclasses.replace(campus, num_slots=10)
+
+
+def test_a_layout_is_drawn_by_words_and_kept_with_the_run(call: Call, tmp_path: Path) -> None:
+    words = ("scenario.num_ues=12", "scenario.num_clusters=3", "scenario.seed=3")
+    again = ("train", "scenario=clusters", *words, "scenario.jamming_power=0.2", *SHORT)
+    call(*again, "hydra.run.dir=runs/one")
+    run = RunDirectory(tmp_path / "runs" / "one")
+    drawn = Scenario(ue_positions=clusters([4, 4, 4], seed=3), num_slots=10, jamming_power=0.2)
+    assert run.configuration().scenario == drawn
+    assert run.configuration().scenario_name == "clusters-3"
+    assert len(run.request()["scenario"]["ue_positions"]) == 12
+    before = run.metrics_file.read_bytes()
+    call(*again, "hydra.run.dir=runs/one")  # which is finished
+    assert run.metrics_file.read_bytes() == before
 
 
 def test_a_sweep_keeps_a_run_for_each_job(call: Call, tmp_path: Path) -> None:
@@ -281,7 +295,13 @@ REFUSALS = [
     ),
     (["train", "algorithm=[ddpg,td3]"], f"algorithm = '[ddpg,td3]': expected one of {NAMES}"),
     (["reproduce", "algorithm=[ddpg,td3]"], f"algorithm = '[ddpg,td3]': expected one of {NAMES}"),
-    (["train", "~scenario"], "~scenario = '': expected one of random_disk, two_clusters"),
+    (["train", "~scenario"], "~scenario = '': expected one of clusters, disk, random_disk"),
+    (["train", "scenario=disk", "scenario.num_ues=0"], "num_ues = 0: expected a whole number >= 1"),
+    (["train", "scenario=disk", "scenario.radius=101"], "radius = 101.0: expected center + radius"),
+    (["train", "scenario=disk", "scenario.seed=-1"], "seed = -1: expected a whole number >= 0"),
+    (["train", "scenario=disk", "scenario.num_clusters=2"], "unknown field 'num_clusters'"),
+    (["reproduce", "scenario=clusters", "scenario.num_clusters=11"], "expected at most num_ues"),
+    (["benchmark", "scenario=disk", "scenario.center=3"], "center = 3: expected two coordinates"),
     (["train", f"scheme={'[' * 300}{']' * 300}"], "the command line is nested too deep"),
     (["report", "-m", "run=a,b"], "-m: this recipe does a single job: leave it out"),
     (["train", "num_slots.x=3"], "'num_slots.x=3': num_slots has no fields: set num_slots=..."),

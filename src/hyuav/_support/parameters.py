@@ -227,6 +227,8 @@ class Parameters(metaclass=_InOneLine):
 def _as_lists(value: Any) -> Any:
     if isinstance(value, Parameters):
         return value.to_dict()
+    if isinstance(value, Mapping):
+        return {name: _as_lists(entry) for name, entry in value.items()}
     return [_as_lists(item) for item in value] if isinstance(value, tuple) else value
 
 

@@ -40,9 +40,9 @@ from hyuav._support.start import loaded, program
 from hyuav.experiments.configuration_files import read_files_as_data
 from hyuav.experiments.elsewhere import AS_TRAINED, as_trained
 from hyuav.experiments.own_algorithms import run_named, with_own
+from hyuav.experiments.scenarios import NAMES, offered
 from hyuav.experiments.usage import usage
 from hyuav.learning.registry import ALGORITHMS, file_name, run_own
-from hyuav.physics.scenario import PRESETS, Scenario
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
 """In the pattern of a run's directory, when the command was called."""
@@ -54,7 +54,7 @@ Record = TypeVar("Record", bound=Parameters)
 
 
 def register(groups: Mapping[str, str]) -> None:
-    """Offer the presets and the algorithms as the groups ``scenario`` and ``algorithm``.
+    """Offer presets and layouts as the group ``scenario``, the algorithms as ``algorithm``.
 
     Args:
         groups: that are wanted, and the member chosen by default. Where one is not, its name is
@@ -62,7 +62,7 @@ def register(groups: Mapping[str, str]) -> None:
     """
     store = ConfigStore.instance()
     members: dict[str, dict[str, Config]] = {
-        "scenario": {name: {"name": name, **Scenario.preset(name).to_dict()} for name in PRESETS},
+        "scenario": {name: {"name": name, **offered(name)} for name in NAMES},
         "algorithm": {
             file_name(name): {"name": name, **kind().to_dict()} for name, kind in ALGORITHMS.items()
         },

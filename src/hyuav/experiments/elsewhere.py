@@ -11,7 +11,8 @@ from typing import Any
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import mapping
 from hyuav._support.yaml_files import read_yaml
-from hyuav.experiments.run_directory import RunConfiguration, RunDirectory, named_scenario
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.scenarios import named_scenario
 from hyuav.physics.scenario import PRESETS, Scenario
 
 AS_TRAINED = "as_trained"

@@ -19,6 +19,7 @@ from hyuav._support.files import create_durably, require_writable, write_durably
 from hyuav._support.parameters import checked, mapping
 from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import read_metrics
+from hyuav.experiments.scenarios import named_scenario
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.policy import Policy, learned_policy
@@ -26,7 +27,7 @@ from hyuav.learning.registry import find
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.learning.weights import count_learners
-from hyuav.physics.scenario import PRESETS, Scenario
+from hyuav.physics.scenario import Scenario
 
 REPORT_FILE = "report.html"
 
@@ -133,17 +134,6 @@ def _learners(values: object, scenario: Scenario) -> tuple[Learner, ...]:
         accepted = "learners that differ in scheme, seed or num_slots"
         raise InputError(rejection("learners", twice[0].to_dict(), accepted))
     return learners
-
-
-def named_scenario(values: object) -> tuple[str, Scenario]:
-    """A scenario and its name, from a preset's name or from the fields with a ``name``."""
-    if isinstance(values, str):
-        return values, Scenario.preset(values)
-    fields = mapping("scenario", values)
-    name = str(fields.pop("name", "custom"))
-    if "ue_positions" not in fields and name in PRESETS:
-        fields["ue_positions"] = PRESETS[name]
-    return name, Scenario.from_dict(fields)
 
 
 def named_algorithm(values: object) -> tuple[str, AlgorithmParameters]:

@@ -13,7 +13,8 @@ from hyuav.experiments.comparison.tables import label
 from hyuav.experiments.elsewhere import HORIZONS
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, Evaluation
 from hyuav.experiments.metrics import readable_metrics
-from hyuav.experiments.run_directory import RunDirectory, named_scenario
+from hyuav.experiments.run_directory import RunDirectory
+from hyuav.experiments.scenarios import named_scenario
 from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import learning_curves, learning_table
