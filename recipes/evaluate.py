@@ -62,8 +62,8 @@ class Evaluate(Parameters):
 @recipe(
     "evaluate",
     Evaluate,
-    groups={},
-    sections={"evaluation": EvaluationParameters, "logger": EvaluationLoggerParameters},
+    groups={"logger": "as_trained"},
+    sections={"evaluation": EvaluationParameters},
     run_directory=".",
 )
 def main(config: Config, _: Path) -> None:

@@ -68,8 +68,8 @@ class Train(Parameters):
 @recipe(
     "train",
     Train,
-    groups={"scenario": "two_clusters", "algorithm": "ddpg"},
-    sections={"training": TrainingParameters, "logger": LoggerParameters},
+    groups={"scenario": "two_clusters", "algorithm": "ddpg", "logger": "wandb"},
+    sections={"training": TrainingParameters},
     run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${hydra.runtime.choices.scenario}"
     "_${hydra.runtime.choices.algorithm}_${seed}",
 )
@@ -105,14 +105,14 @@ def main(config: Config, directory: Path) -> None:
 
 
 def go_on(path: str, config: Config) -> None:
-    """Go on with a training as it was configured; the place to compute and to log may change.
+    """Go on with a training as it was configured; the place to compute and the logger may change.
 
     Raises:
         InputError: there is none, or something else was asked for beside it.
     """
     named = {"algorithm"} if is_reference(config["algorithm"]["name"]) else set()
     for name in given() - {"resume", "device", "threads"} - named:
-        if name == "hydra.run.dir" or not name.startswith(("logger.", "hydra.")):
+        if name == "hydra.run.dir" or not name.startswith(("logger", "hydra.")):
             accepted = "nothing beside it but device=, threads= and logger.NAME="
             raise InputError(f"{rejection('resume', path, accepted)}, not {name}")
     asked = RunDirectory(path).request()
