@@ -11,8 +11,8 @@ import wandb
 from rich.console import Console
 
 from hyuav.experiments.tracking import Job, LoggerParameters, Session
+from hyuav.experiments.tracking.logged_run import LoggedRun
 from hyuav.experiments.tracking.memory import remembered
-from hyuav.experiments.tracking.session import LoggedRun
 from hyuav.experiments.tracking.wandb_run import WandbRun
 from offline_wandb import history, offline_runs, recorded
 

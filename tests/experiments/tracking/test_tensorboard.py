@@ -48,7 +48,9 @@ def test_an_evaluation_goes_to_tensorboard_as_its_training_did(call: Call, tmp_p
     logs = tmp_path / "run" / "tensorboard" / "evaluate"
     shown = curves(logs)
     assert [step for step, _ in shown["proposed/secrecy_sum_rate"]] == [0]
-    assert shown["optimum/fraction_of_optimum"] == [(0, pytest.approx(1.0))]
+    ((step, fraction),) = shown["optimum/fraction_of_optimum"]
+    assert step == 0
+    assert fraction == pytest.approx(1.0)
     events = EventAccumulator(str(logs))
     events.Reload()
     assert events.Tags()["images"] == ["figures/flight_map"]

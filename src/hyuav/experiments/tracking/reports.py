@@ -11,6 +11,7 @@ from rich.console import Console
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS
+from hyuav.experiments.tracking.logged_run import Job
 from hyuav.experiments.tracking.memory import model_name, remembered
 from hyuav.experiments.tracking.parameters import (
     AS_TRAINED,
@@ -18,7 +19,7 @@ from hyuav.experiments.tracking.parameters import (
     TENSORBOARD,
     LoggerParameters,
 )
-from hyuav.experiments.tracking.session import Job, Session
+from hyuav.experiments.tracking.session import Session
 
 
 def log_evaluation(
@@ -75,7 +76,11 @@ def log_comparison(
         console: on which the end is told.
     """
     logger = in_group(logger, directory)
-    means = tables["algorithms"].set_index("algorithm")["iqm"].add_suffix("/iqm").to_dict()
+    algorithms = tables["algorithms"]
+    means = {
+        f"{name}/iqm": float(value)
+        for name, value in zip(algorithms["algorithm"], algorithms["iqm"], strict=True)
+    }
     filled = {name: table for name, table in tables.items() if len(table)}
     with Session(Job(directory, config, "comparison", directory), logger, console) as session:
         session.attempt(lambda run: run.results(means, filled, directory))

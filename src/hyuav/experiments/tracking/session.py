@@ -1,76 +1,16 @@
-"""What a job logs through a library, whose failures stop nothing."""
+"""A job's run of the logger that was asked for, whose failures stop nothing."""
 
-import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable
 from types import TracebackType
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Self
 
-import pandas as pd
 from rich.console import Console
 
-from hyuav._support.errors import harmless
 from hyuav._support.terminal import print_line
+from hyuav.experiments.tracking.logged_run import Job, LoggedRun, reason, say
 from hyuav.experiments.tracking.parameters import TENSORBOARD, WANDB, LoggerParameters
 
 TITLES = {WANDB: "W&B", TENSORBOARD: "TensorBoard"}
-
-
-class Metric(NamedTuple):
-    """How a library that can is to draw a metric, and what it is to keep of it."""
-
-    name: str
-    axis: str
-    """The metric that it is drawn against."""
-    summary: str | None = None
-    """Such as "max,last"."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """What is logged: a training, an evaluation or a comparison."""
-
-    directory: Path
-    """That the library keeps its files in."""
-    config: Mapping[str, Any]
-    """What was asked for."""
-    job_type: str
-    memory: Path | None = None
-    """Directory that remembers the run's identity, so that the next job goes on with it."""
-    metrics: Sequence[Metric] = ()
-    models: Sequence[str] = ()
-    """Artifacts that the job builds on, with their aliases."""
-    first_step: int = 0
-    """Whatever was logged from this step on is replaced."""
-
-
-class LoggedRun(Protocol):
-    """One run of a library; it may raise whatever the library raises."""
-
-    id: str | None
-    """By which it can be continued, where there is such a thing."""
-
-    @property
-    def kept(self) -> str:
-        """The command that shows or sends what has been logged."""
-
-    def scalars(self, values: Mapping[str, float], step: int) -> None:
-        """Add numbers to the history."""
-
-    def results(
-        self, scalars: Mapping[str, float], tables: Mapping[str, pd.DataFrame], directory: Path
-    ) -> None:
-        """Log what came of the whole job: numbers, tables, and a directory's figures and report."""
-
-    def model(self, files: Mapping[str, Path], metadata: Mapping[str, Any]) -> None:
-        """Keep checkpoints, by alias."""
-
-    def close(self, failed: bool) -> str:
-        """End the run, and say in one line where it is to be seen."""
-
-    def abandon(self) -> None:
-        """End a run in which something has failed."""
 
 
 class Session:
@@ -136,14 +76,3 @@ class Session:
         from hyuav.experiments.tracking.wandb_run import WandbRun
 
         return WandbRun(self._job, self._logger)
-
-
-def reason(error: Exception) -> str:
-    """The first line of an error, which may be long."""
-    first, *_ = str(error).strip().splitlines() or [type(error).__name__]
-    return first[:200]
-
-
-def say(line: str) -> None:
-    """Print a line on the standard error."""
-    print(harmless(line), file=sys.stderr)

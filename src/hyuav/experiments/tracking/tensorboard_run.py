@@ -13,8 +13,8 @@ import yaml
 from torch.utils.tensorboard import SummaryWriter
 from torchrl.record.loggers.tensorboard import TensorboardLogger
 
+from hyuav.experiments.tracking.logged_run import Job
 from hyuav.experiments.tracking.parameters import TENSORBOARD, LoggerParameters
-from hyuav.experiments.tracking.session import Job
 
 SECONDS_TO_WRITE = 10
 """After which a number that was logged can be looked at."""
@@ -46,7 +46,7 @@ class TensorBoardRun:
         logger: a name in it stands behind the kind of job.
     """
 
-    id = None
+    id: str | None = None
 
     def __init__(self, job: Job, logger: LoggerParameters) -> None:
         self._directory, self._step = job.directory / TENSORBOARD, job.first_step

@@ -15,8 +15,9 @@ from hyuav._support.terminal import TrainingProgress
 from hyuav.experiments.metrics import METRIC_COLUMNS, MetricsFile
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import Reported, save_checkpoints
+from hyuav.experiments.tracking.logged_run import Job, Metric
 from hyuav.experiments.tracking.parameters import LoggerParameters
-from hyuav.experiments.tracking.session import Job, Metric, Session
+from hyuav.experiments.tracking.session import Session
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Episode, Training
 

@@ -15,9 +15,9 @@ import wandb
 from torchrl.record.loggers.wandb import WandbLogger
 
 from hyuav.experiments.run_directory import REPORT_FILE
+from hyuav.experiments.tracking.logged_run import Job, reason, say
 from hyuav.experiments.tracking.memory import model_name, remember, remembered
 from hyuav.experiments.tracking.parameters import LoggerParameters
-from hyuav.experiments.tracking.session import Job, reason, say
 
 SECONDS_TO_BEGIN, SECONDS_TO_FINISH = 30.0, 300.0
 """For which a server is waited for; what is not sent by then stays in the directory."""
