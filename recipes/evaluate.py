@@ -69,8 +69,8 @@ class Evaluate(Parameters):
 @recipe(
     "evaluate",
     Evaluate,
-    groups={"scenario": AS_TRAINED},
-    sections={"evaluation": EvaluationParameters, "logger": EvaluationLoggerParameters},
+    groups={"scenario": AS_TRAINED, "logger": AS_TRAINED},
+    sections={"evaluation": EvaluationParameters},
     run_directory=".",
 )
 def main(config: Config, _: Path) -> None:

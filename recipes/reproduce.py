@@ -85,12 +85,8 @@ class Reproduce(Parameters):
 @recipe(
     "reproduce",
     Reproduce,
-    groups={"scenario": "two_clusters", "algorithm": "ddpg_robust"},
-    sections={
-        "training": TrainingParameters,
-        "evaluation": EvaluationParameters,
-        "logger": LoggerParameters,
-    },
+    groups={"scenario": "two_clusters", "algorithm": "ddpg_robust", "logger": "wandb"},
+    sections={"training": TrainingParameters, "evaluation": EvaluationParameters},
     run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_reproduce_${hydra.runtime.choices.scenario}",
 )
 def main(config: Config, directory: Path) -> None:

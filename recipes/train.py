@@ -72,8 +72,8 @@ class Train(Parameters):
 @recipe(
     "train",
     Train,
-    groups={"scenario": "two_clusters", "algorithm": "ddpg"},
-    sections={"training": TrainingParameters, "logger": LoggerParameters},
+    groups={"scenario": "two_clusters", "algorithm": "ddpg", "logger": "wandb"},
+    sections={"training": TrainingParameters},
     run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${hydra.runtime.choices.scenario}"
     "_${hydra.runtime.choices.algorithm}_${seed}",
 )
@@ -111,14 +111,14 @@ def main(config: Config, directory: Path) -> None:
 def go_on(path: str, config: Config) -> None:
     """Go on with a training as it was configured, or for more episodes.
 
-    The place to compute and to log may change.
+    The place to compute and the logger may change.
 
     Raises:
         InputError: there is none, or something was asked for that would change what is trained.
     """
     named = {"algorithm"} if is_reference(config["algorithm"]["name"]) else set()
     for name in given() - {"resume", "device", "threads", EPISODES} - named:
-        if name == "hydra.run.dir" or not name.startswith(("logger.", "hydra.")):
+        if name == "hydra.run.dir" or not name.startswith(("logger", "hydra.")):
             accepted = f"nothing beside it but device=, threads=, logger.NAME= and {EPISODES}="
             hint = f"{override('warm_start', Path(path))} begins a new training with its weights"
             raise InputError(f"{rejection('resume', path, accepted)}, not {name} ({hint})")

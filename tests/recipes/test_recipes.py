@@ -244,13 +244,13 @@ def test_a_scenarios_name_is_printed_as_text_that_no_terminal_obeys(
 
 NAMED = ("train", "compare", "evaluate", "reproduce", "report", "draw", "dashboard", "benchmark")
 SECTIONS = {
-    "train": ("training", "logger"),
-    "compare": ("training", "evaluation", "logger"),
-    "evaluate": ("evaluation", "logger"),
-    "reproduce": ("training", "evaluation", "logger"),
+    "train": ("training",),
+    "compare": ("training", "evaluation"),
+    "evaluate": ("evaluation",),
+    "reproduce": ("training", "evaluation"),
 }
 ENTRIES = {
-    "train": ("logger",),
+    "train": ("training",),
     "compare": ("learners", "algorithm"),
     "reproduce": ("seeds",),
     "benchmark": ("parts",),
@@ -275,6 +275,11 @@ REFUSALS = [
     (["train", "algorithm.discount=1.5"], "discount = 1.5: expected a number in [0, 1]"),
     (["train", "training.num_episodes=1.5"], "num_episodes = 1.5: expected a whole number >= 1"),
     (["train", "logger.mode=on"], "mode = 'on': expected one of offline, online, disabled"),
+    (["train", "logger=tensorbord"], "did you mean 'tensorboard'"),
+    (["compare", "logger=3"], "Config group override must be a string"),
+    (["train", "~logger"], "~logger = '': expected one of none, tensorboard, wandb"),
+    (["evaluate", "~logger"], "expected one of as_trained, none, tensorboard, wandb"),
+    (["train", "logger=as_trained"], "expected one of none, tensorboard, wandb"),
     (["train", "device=tpu9"], "device = 'tpu9': expected a device of this machine"),
     (["train", "warm_start=nowhere.pt"], "checkpoint = 'nowhere.pt': expected a checkpoint"),
     (["train", "scenario.ue_positions=[[1,2]"], "no viable alternative at input"),

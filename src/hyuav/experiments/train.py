@@ -32,12 +32,12 @@ def train(
     Args:
         directory: of the run.
         configuration: of the training.
-        logger: what Weights & Biases gets.
+        logger: where the metrics go besides.
         console: to show progress on.
         device: to train on.
         initial_weights: to begin with, instead of fresh ones.
         request: all that was asked for, to be kept with the run.
-        logs: directory for the files of Weights & Biases; the run's where it is None.
+        logs: directory for the logger's files; the run's where it is None.
 
     Raises:
         InputError: the directory is taken, or the checkpoint does not fit.
@@ -69,10 +69,10 @@ def resume(
 
     Args:
         directory: of the run.
-        logger: what Weights & Biases gets.
+        logger: where the metrics go besides.
         console: to show progress on.
         device: to train on.
-        logs: directory for the files of Weights & Biases; the run's where it is None.
+        logs: directory for the logger's files; the run's where it is None.
         num_episodes: after which it ends, from now on; as configured where it is None.
 
     Raises:
@@ -156,7 +156,7 @@ def train_or_resume(
     Args:
         directory: of the run.
         configuration: of the training.
-        logger: what Weights & Biases gets.
+        logger: where the metrics go besides.
         console: to show progress on.
         device: to train on.
         initial_weights: finds what a new training begins with; None for fresh weights.
