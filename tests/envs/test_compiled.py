@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDictBase
 
 from hyuav import InputError, Scenario, make_env
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.references.straight import ConstantVelocity
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")

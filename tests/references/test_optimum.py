@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from hyuav import InputError, Scenario, make_env
-from hyuav.physics.energy import budget_speed
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.energy import budget_speeds
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS
 from hyuav.physics.slot import Control, Physics, slot
 from hyuav.references.optimum import (
@@ -86,7 +86,7 @@ def brute_force(scenario: Scenario, scheme: str, resolution: float) -> float:
     relay, jamming = slots.relay.sum_rate, slots.jamming.sum_rate
     rewards = {"relay": relay, "jamming": jamming, "hybrid": torch.maximum(relay, jamming)}
     reward = dict(zip(points, rewards[scheme].tolist(), strict=True))
-    norm = budget_speed(scenario, scheme)
+    norm = budget_speeds(scenario, scheme)[0]
     if scenario.speed_limit == "disc":
         norm = min(norm, scenario.max_speed)
 

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import Scenario
 
 LAYOUT = ("ue_positions", "legitimate_position", "helper_starts", "eavesdropper_positions")

@@ -23,7 +23,7 @@ from hyuav.envs.arguments import (
 from hyuav.envs.diagnostics import diagnose, diagnostics_spec
 from hyuav.envs.draws import Draws
 from hyuav.physics.layout import Nodes
-from hyuav.physics.offloading import ModeRule
+from hyuav.physics.modes import ModeRule
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Control, Physics, SlotOutcome, slot
 from hyuav.physics.tasks import Tasks
@@ -99,14 +99,14 @@ class SecureOffloadingEnv(EnvBase):
         self.schemes = as_schemes(scheme, self.batch_size)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
-        rules = ModeRule.of(self.schemes, self.device)
+        rules = ModeRule.of(self.schemes, self.scenario.num_helpers, self.device)
         self._mode_rule = ModeRule(
             *(self._per_row(torch.as_tensor(flags, device=self.device)) for flags in rules)
         )
         norm_limit = self.physics.norm_limit(self.schemes)
         self._norm_limit = None
         if norm_limit is not None:
-            self._norm_limit = self._per_row(norm_limit).unsqueeze(-2)  # the helpers' axis
+            self._norm_limit = self._per_row(norm_limit).unsqueeze(-1)
         self._make_specs()
         self.draws: Draws
         if isinstance(seed, list | tuple):

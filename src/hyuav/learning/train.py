@@ -47,7 +47,7 @@ from hyuav.learning.weights import (
     load_weights,
     replace_learners,
 )
-from hyuav.physics.offloading import ModeRuleName
+from hyuav.physics.modes import ModeRuleName
 from hyuav.physics.scenario import Scenario
 
 

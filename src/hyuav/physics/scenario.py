@@ -73,11 +73,19 @@ def _as_several(value: Any) -> Any:
     return (value,) if pair else value
 
 
-OneNode = Annotated[
+LARGEST_NUMBER_OF_HELPERS = 6
+"""So many have 64 modes, each of which is tried in each slot."""
+
+Helpers = Annotated[
     tuple[Point, ...],
     BeforeValidator(_as_several),
-    Field(min_length=1, max_length=1, description="the position (x, y) of one node"),
+    Field(
+        min_length=1,
+        max_length=LARGEST_NUMBER_OF_HELPERS,
+        description=f"the positions (x, y) in metres of 1 to {LARGEST_NUMBER_OF_HELPERS} helpers",
+    ),
 ]
+Eavesdroppers = Annotated[Points, BeforeValidator(_as_several)]
 
 
 @dataclass(frozen=True)
@@ -100,8 +108,12 @@ class Scenario(Parameters):
 
     ue_positions: Points = parameter(symbol="(x_u, y_u)", unit="m")
     legitimate_position: Point = parameter((0.0, 0.0), symbol="(x_L, y_L)", unit="m")
-    eavesdropper_positions: OneNode = parameter(((80.0, 80.0),), symbol="(x_E, y_E)", unit="m")
-    helper_starts: OneNode = parameter(((-60.0, -60.0),), symbol="(x_H(0), y_H(0))", unit="m")
+    eavesdropper_positions: Eavesdroppers = parameter(
+        ((80.0, 80.0),), symbol="(x_E, y_E)", unit="m"
+    )
+    helper_starts: Helpers = parameter(((-60.0, -60.0),), symbol="(x_H(0), y_H(0))", unit="m")
+    eavesdroppers: Annotated[str, OneOf("independent", "colluding")] = parameter("independent")
+    """Whether the best-placed eavesdropper counts, or their SNRs add up."""
     num_slots: Slots = parameter(20, symbol="T")
     slot_duration: Positive = parameter(1.0, symbol="Delta", unit="s")
     map_side: Length = parameter(200.0, symbol="l_max", unit="m")

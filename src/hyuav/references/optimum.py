@@ -26,7 +26,7 @@ from torch import Tensor
 from hyuav._support.errors import InputError, InputTypeError, rejection
 from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked
 from hyuav.envs.arguments import as_scenario, as_seed
-from hyuav.physics.offloading import MODE_RULES, ModeRuleName
+from hyuav.physics.modes import MODE_RULES, ModeRuleName
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.grid import Grid, Reach, best_flight, grid_over_map, values_to_go
@@ -114,7 +114,7 @@ def solve_optimum(
 
     Args:
         scenario: node positions and parameters, or the name of a preset.
-        mode_rules: who may choose the modes, of :data:`hyuav.physics.offloading.MODE_RULES`.
+        mode_rules: who may choose the modes, of :data:`hyuav.physics.modes.MODE_RULES`.
         resolution: spacing of the grid in m; the helper's start is a grid point.
         draws: of a slot's fading and tasks that the expected reward is averaged over, the same
             at all positions. They choose the flight and nothing else.

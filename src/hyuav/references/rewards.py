@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from hyuav.physics.channel import Links
-from hyuav.physics.offloading import MODE_RULES, prefers_relay
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.slot import Physics
 from hyuav.physics.tasks import Tasks, draw_tasks
 
@@ -82,7 +82,7 @@ def estimate_return(
     error = float(episodes.std()) / math.sqrt(draws) if draws > 1 else 0.0
     relay, jamming = total[MODE_RULES.index("relay")], total[MODE_RULES.index("jamming")]
     modes = {
-        "hybrid": prefers_relay(relay, jamming).to(torch.int64),
+        "hybrid": (relay > jamming).to(torch.int64),
         "relay": torch.ones(num_slots, dtype=torch.int64),
         "jamming": torch.zeros(num_slots, dtype=torch.int64),
     }
@@ -131,7 +131,6 @@ def _rewards(
     # A UE at D_max is covered (eq. 5), also where float64 puts a grid point just beyond.
     closing = 1e-12 * physics.scenario.map_side
     geometry = geometry._replace(ue_to_helper=geometry.ue_to_helper - closing)
-    relay = physics.relay_outcome(geometry, gains, tasks).sum_rate
-    jamming = physics.jamming_outcome(geometry, gains, tasks).sum_rate
+    jamming, relay = (mode.sum_rate for mode in physics.outcomes(geometry, gains, tasks))
     rewards = {"hybrid": torch.maximum(relay, jamming), "relay": relay, "jamming": jamming}
     return torch.stack([rewards[rule] for rule in MODE_RULES])

@@ -7,7 +7,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
 from hyuav._support.errors import InputError
-from hyuav.physics.energy import budget_speed
+from hyuav.physics.energy import budget_speeds
 from hyuav.physics.scenario import Point, Scenario
 
 
@@ -50,7 +50,7 @@ class ConstantVelocity(TensorDictModuleBase):
         fastest = max(abs(component) for component in velocity)
         if scenario.speed_limit == "disc":
             fastest = math.hypot(*velocity)
-        affordable = budget_speed(scenario, mode_rule)
+        affordable = budget_speeds(scenario, mode_rule)[0]
         self._require_speed(scenario, destination, fastest, scenario.max_speed, "max_speed")
         self._require_speed(
             scenario, destination, math.hypot(*velocity), affordable, "helper_energy_budget"
