@@ -124,7 +124,7 @@ def test_an_unknown_preset_is_answered_with_the_closest() -> None:
 def test_every_parameter_of_the_paper_has_its_symbol_and_unit() -> None:
     metadata = {field.name: field.metadata for field in dataclasses.fields(Scenario)}
     # This project's switches have no symbol in the paper.
-    own = {"fading", "speed_limit", "eavesdroppers"}
+    own = {"fading", "speed_limit", "eavesdroppers", "power_control"}
     assert {name for name in FIELDS if not metadata[name]["symbol"]} == own
     symbols = [metadata[name]["symbol"] for name in FIELDS if name not in own]
     assert len(set(symbols)) == len(symbols)

@@ -34,7 +34,7 @@ class SecureOffloadingEnv(EnvBase):
 
     Time is not limited here (:func:`hyuav.make_env` truncates after T slots) and no state is
     terminal. All entries are physical and have the batch size in front; U is the number of UEs, H
-    of helpers and E of eavesdroppers. For the time being H and E are 1.
+    of helpers and E of eavesdroppers.
 
     Observation:
         - ``position`` (H, 2) float32, m: the helpers', within the map.
@@ -49,7 +49,8 @@ class SecureOffloadingEnv(EnvBase):
 
     Action:
         - ``action`` (H, 2) float32 in [-1, 1]: the velocity in units of v_max. It is clipped, then
-          shortened to the speed limit and to the helper's energy budget.
+          shortened to the speed limit and to the helper's energy budget. With ``power_control``
+          (H, 3): the last number is the power, from the least (-1) to the nominal (1), in dB.
 
     Reward:
         - ``reward`` (1,) float32, bps/Hz: the secrecy sum-rate of the slot (eq. 6), before any
@@ -62,8 +63,8 @@ class SecureOffloadingEnv(EnvBase):
     Args:
         scenario: node positions and parameters, or the name of a preset; or one of these for each
             row of the batch's first dimension, which differ in positions only.
-        scheme: "hybrid", "relay" or "jamming"; or one of these for each row of the batch's
-            first dimension.
+        scheme: "hybrid", "relay", "jamming", or a letter r or j for each helper; or one of these
+            for each row of the batch's first dimension.
         batch_size: of the helpers flown at once.
         device: of all tensors.
         seed: of the fading and the tasks; the same seed gives the same episode, whether or not
@@ -96,7 +97,7 @@ class SecureOffloadingEnv(EnvBase):
         super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
         self.scenarios = as_scenarios(scenario, self.batch_size)
         self.physics = Physics(self.scenarios[0], self.device, nodes=self._layout())
-        self.schemes = as_schemes(scheme, self.batch_size)
+        self.schemes = as_schemes(scheme, self.batch_size, self.scenario.num_helpers)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
         rules = ModeRule.of(self.schemes, self.scenario.num_helpers, self.device)
@@ -147,8 +148,8 @@ class SecureOffloadingEnv(EnvBase):
         def numbers(*shape: int) -> Unbounded:
             return Unbounded((*batch, *shape), dtype=torch.float32, device=device)
 
-        def bounded(bound: float) -> Bounded:
-            shape = (*batch, num_helpers, 2)
+        def bounded(bound: float, size: int = 2) -> Bounded:
+            shape = (*batch, num_helpers, size)
             return Bounded(-bound, bound, shape, dtype=torch.float32, device=device)
 
         self.observation_spec = Composite(
@@ -172,7 +173,7 @@ class SecureOffloadingEnv(EnvBase):
             self.state_spec["diagnostics"] = Composite(
                 edge_load=edge_load, shape=batch, device=device
             )
-        self.action_spec = bounded(1.0)
+        self.action_spec = bounded(1.0, self.scenario.action_size)
         self.reward_spec = numbers(1)
         self.done_spec = Composite(done=flags(1), terminated=flags(1), shape=batch, device=device)
 
@@ -182,7 +183,8 @@ class SecureOffloadingEnv(EnvBase):
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
         position = self.start(tensordict)
         # What is found at the start is what a slot brings in which the helpers stay there.
-        after_reset = self._slot(position, torch.zeros_like(position))[0]
+        staying = Control(torch.zeros_like(position), self._mode_rule)
+        after_reset = self._slot(position, staying)[0]
         if self.diagnostics:
             after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
         return after_reset
@@ -207,10 +209,10 @@ class SecureOffloadingEnv(EnvBase):
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         position, action = tensordict["position"], tensordict["action"]
-        require_shape("action", action, position.shape)
+        require_shape("action", action, (*position.shape[:-1], self.scenario.action_size))
         action = action.to(torch.float32)  # as specified, whatever is given
-        velocity = self.physics.velocity(action, self._norm_limit)
-        after, outcome, tasks = self._slot(position, velocity)
+        control = self.physics.control(action, self._norm_limit, self._mode_rule)
+        after, outcome, tasks = self._slot(position, control)
         after["reward"] = reward = outcome.sum_rate
         after["done"] = torch.zeros_like(reward, dtype=torch.bool)
         after["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
@@ -221,14 +223,14 @@ class SecureOffloadingEnv(EnvBase):
         return after
 
     def _slot(
-        self, position: Tensor, velocity: Tensor
+        self, position: Tensor, control: Control
     ) -> tuple[TensorDictBase, SlotOutcome, Tasks | None]:
         """Fly one slot: what is observed, what the slot brought, and its tasks."""
         fading = self.draws.fading()
         tasks = self.draws.tasks() if self.draws_tasks else None
         links = None if fading is None else self.physics.link_row.unflatten(fading)
         nodes = self.physics.nodes._replace(helper=position)
-        outcome = slot(self.physics, nodes, Control(velocity, self._mode_rule), links, tasks)
+        outcome = slot(self.physics, nodes, control, links, tasks)
         observed = TensorDict(
             position=outcome.nodes.helper,
             mode=outcome.relays.to(torch.int64),

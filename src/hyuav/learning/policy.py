@@ -48,7 +48,7 @@ def fly_noise_free(
         slot = env.step(algorithm.actor(state))
         control_term += algorithm.guide.control_term(slot).mean(dim=(1, 2))
         state = env.step_mdp(slot)
-        off_map += state["off_map"].squeeze(-1).float().mean(dim=-1)
+        off_map += state["off_map"].sum(dim=-1).float().mean(dim=-1)
         positions.append(layout.position(state["observation"])[:, 0])
     reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
     sum_rate = reward + scenario.off_map_penalty * off_map

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 import torch
 from torch import Tensor
 
-from hyuav._support.errors import InputError, rejection
+from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.parameters import OneOf
 
 
@@ -52,13 +52,14 @@ ModeRuleName = Annotated[str, OneOf(*MODE_RULES)]
 _LETTERS = {"r": True, "j": False}
 
 
-def fixed_modes(mode_rule: str, num_helpers: int) -> tuple[bool, ...] | None:
+def fixed_modes(mode_rule: str, num_helpers: int, name: str = "scheme") -> tuple[bool, ...] | None:
     """The modes that a rule prescribes, True where a helper relays; None where they are chosen.
 
     Args:
         mode_rule: a name of :data:`MODE_RULES`, or a letter for each helper, "r" where it relays
             and "j" where it jams.
         num_helpers: H.
+        name: of what is refused.
 
     Raises:
         InputError: it is none of these.
@@ -67,11 +68,15 @@ def fixed_modes(mode_rule: str, num_helpers: int) -> tuple[bool, ...] | None:
         return None
     if mode_rule in MODE_RULES:
         return (mode_rule == "relay",) * num_helpers
-    if len(mode_rule) == num_helpers and set(mode_rule) <= set(_LETTERS):
-        return tuple(_LETTERS[letter] for letter in mode_rule)
-    letters = f"a letter r or j for each of {num_helpers} helpers"
-    accepted = f"one of {', '.join(MODE_RULES)}, or {letters}"
-    raise InputError(rejection("scheme", mode_rule, accepted))
+    letters = [_LETTERS.get(letter) for letter in mode_rule] if isinstance(mode_rule, str) else []
+    modes = tuple(relays for relays in letters if relays is not None)
+    if len(modes) == len(letters) == num_helpers:
+        return modes
+    if num_helpers == 1:
+        require_choice(name, mode_rule, MODE_RULES)
+    letters_for_all = f"a letter r or j for each of {num_helpers} helpers"
+    accepted = f"one of {', '.join(MODE_RULES)}, or {letters_for_all}"
+    raise InputError(rejection(name, mode_rule, accepted))
 
 
 def beats(sum_rate: Tensor, best: Tensor, rule: ModeRule, mode: int) -> Tensor:

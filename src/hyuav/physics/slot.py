@@ -256,6 +256,22 @@ class Physics:
         """
         return motion.feasible_velocity(action, self.scenario.max_speed, norm_limit)
 
+    def control(self, action: Tensor, norm_limit: Tensor | None, mode_rule: ModeRule) -> Control:
+        """What helpers do that are steered by actions.
+
+        Args:
+            action: (..., H, 2) in [-1, 1], the velocity in units of v_max; where powers are
+                controlled (..., H, 3): the last number a is for the nominal power times
+                10^(-(D / 10) (1 - a) / 2), with D = ``power_range`` in dB.
+            norm_limit: as for :meth:`velocity`.
+            mode_rule: which modes may be chosen.
+        """
+        scenario, power = self.scenario, None
+        if scenario.power_control:
+            below = (1.0 - action[..., 2].clamp(-1.0, 1.0)) * (scenario.power_range / 20.0)
+            action, power = action[..., :2], torch.pow(10.0, -below)
+        return Control(self.velocity(action, norm_limit), mode_rule, power)
+
     def move(self, position: Tensor, velocity: Tensor) -> motion.Move:
         """Fly one slot from ``position`` (..., 2) m at ``velocity`` (..., 2) m/s."""
         scenario = self.scenario
