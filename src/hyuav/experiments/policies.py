@@ -13,7 +13,8 @@ from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import FlightPolicy, solve_optimum
+from hyuav.references.flight import FlightPolicy
+from hyuav.references.optimum import solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
 

@@ -32,8 +32,8 @@ class ModeRule(NamedTuple):
     ) -> "ModeRule":
         """The rules of these names, as :func:`fixed_modes` reads them: flags (len(names), 2^H)."""
         modes = mode_vectors(num_helpers)
-        fixed = [fixed_modes(name, num_helpers) for name in names]
-        allowed = torch.tensor([[own in (None, mode) for mode in modes] for own in fixed])
+        of_names = [allowed_vectors(name, num_helpers) for name in names]
+        allowed = torch.tensor([[mode in own for mode in modes] for own in of_names])
         first = allowed & (allowed.cumsum(dim=-1) == 1)
         return cls(allowed.to(device), first.to(device))
 
@@ -77,6 +77,16 @@ def fixed_modes(mode_rule: str, num_helpers: int, name: str = "scheme") -> tuple
     letters_for_all = f"a letter r or j for each of {num_helpers} helpers"
     accepted = f"one of {', '.join(MODE_RULES)}, or {letters_for_all}"
     raise InputError(rejection(name, mode_rule, accepted))
+
+
+def allowed_vectors(mode_rule: str, num_helpers: int) -> list[tuple[bool, ...]]:
+    """The modes that a rule allows, in the order of :func:`mode_vectors`.
+
+    Raises:
+        InputError: as :func:`fixed_modes`.
+    """
+    fixed = fixed_modes(mode_rule, num_helpers)
+    return mode_vectors(num_helpers) if fixed is None else [fixed]
 
 
 def beats(sum_rate: Tensor, best: Tensor, rule: ModeRule, mode: int) -> Tensor:

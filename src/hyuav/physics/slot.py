@@ -287,7 +287,12 @@ class Physics:
         return channel.rician_power(self.k_factor, (*shape, self.link_row.size), generator)
 
     def outcomes(
-        self, geometry: Geometry, gains: Links, tasks: Tasks | None, power: Tensor | None = None
+        self,
+        geometry: Geometry,
+        gains: Links,
+        tasks: Tasks | None,
+        power: Tensor | None = None,
+        vectors: Sequence[Sequence[bool]] | None = None,
     ) -> tuple[ModeOutcome, ...]:
         """The slot in each of the helpers' modes.
 
@@ -296,15 +301,16 @@ class Physics:
             gains: with fading.
             tasks: needed where :attr:`edge_can_saturate`, and used nowhere else.
             power: as in :class:`Control`.
+            vectors: the modes that are asked for; all by default.
 
         Returns:
-            one for each of :func:`hyuav.physics.modes.mode_vectors`.
+            one for each of them, in the order of :func:`hyuav.physics.modes.mode_vectors`.
         """
         sent = self._sent
         if power is not None:
             sent = rates.Sent(sent.ue, sent.relay * power, sent.jamming * power)
-        vectors = modes.mode_vectors(self.scenario.num_helpers)
-        return tuple(self._outcome(geometry, gains, sent, relays, tasks) for relays in vectors)
+        asked = modes.mode_vectors(self.scenario.num_helpers) if vectors is None else vectors
+        return tuple(self._outcome(geometry, gains, sent, relays, tasks) for relays in asked)
 
     def _outcome(
         self,
