@@ -51,7 +51,7 @@ from hyuav.experiments.train import train_or_resume
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Preset, Scenario
 from hyuav.references.optimum import require_resolution
 from hyuav.viz.data.runs import AS_IN_PAPER

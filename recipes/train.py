@@ -46,7 +46,7 @@ from hyuav.experiments.train import resume, train_or_resume
 from hyuav.learning.registry import is_reference
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.physics.offloading import ModeRuleName
+from hyuav.physics.modes import ModeRuleName
 from hyuav.viz.html.page import write_report
 
 EPISODES = "training.num_episodes"

@@ -15,7 +15,8 @@ from hypothesis import settings
 import hyuav  # noqa: F401 - registers the environments
 from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
-from hyuav.references.optimum import FlightPolicy, solve_optimum
+from hyuav.references.flight import FlightPolicy
+from hyuav.references.optimum import solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 from recipe_calls import Call, Refusal
 

@@ -22,45 +22,63 @@ from hyuav.physics.layout import Nodes
 from hyuav.physics.slot import Control, Physics, SlotOutcome
 from hyuav.physics.tasks import Tasks
 
-RELAY, JAMMING = 1, 0
+RELAY, JAMMING = (True,), (False,)
+"""The modes of one helper, as those of several are given: True for each that relays."""
+
+STRAIGHT = 0
+"""The way of a UE that sends to L itself; i is the way through helper i, counted from 1."""
 
 Numbers = Sequence[float]
+Places = Numbers | Sequence[Numbers]
+"""The position of one helper, or those of several."""
 
 
 @dataclass(frozen=True)
 class Gains:
-    """Channel power gains of one slot."""
+    """Channel power gains of one slot, by UE, helper and eavesdropper."""
 
     g_ul: list[float]
-    g_uh: list[float]
-    g_ue: list[float]
-    g_hl: float
-    g_he: float
+    g_uh: list[list[float]]
+    g_ue: list[list[float]]
+    g_hl: list[float]
+    g_he: list[list[float]]
+    g_hh: dict[tuple[int, int], float]
+    """By pairs of helpers, in both orders."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One slot in one mode."""
+    """One slot in one mode of each helper."""
 
     sum_rate: float
     offloading: list[bool]
     secrecy_rate: list[float]
+    ways: list[int]
     margin: float
     """The smallest distance, relative to its scale, of any compared quantity to its threshold."""
 
 
 @dataclass(frozen=True)
 class Slot:
-    """One slot in the mode that is chosen, with everything it costs."""
+    """One slot in the modes that are chosen, with everything it costs."""
 
-    mode: int
+    modes: tuple[bool, ...]
     chosen: Outcome
-    relay: Outcome
-    jamming: Outcome
+    by_modes: dict[tuple[bool, ...], Outcome]
     ue_energy: list[float]
     edge_load: float
-    transmission_energy: float
+    transmission_energy: list[float]
     margin: float
+
+    @property
+    def relay(self) -> Outcome:
+        """With all helpers relaying."""
+        return self.by_modes[(True,) * len(self.modes)]
+
+    @property
+    def jamming(self) -> Outcome:
+        """With all helpers jamming."""
+        return self.by_modes[(False,) * len(self.modes)]
 
 
 @dataclass(frozen=True)
@@ -79,46 +97,81 @@ def distance(a: Numbers, b: Numbers) -> float:
 
 
 def distances(s: Scenario, helper: Numbers) -> list[float]:
-    nodes = [*s.ue_positions, s.legitimate_position, s.eavesdropper_positions[0]]
+    nodes = [*s.ue_positions, s.legitimate_position, *s.eavesdropper_positions]
     return [distance(helper, node) for node in nodes]
 
 
-def gains(s: Scenario, helper: Numbers, fading: Numbers | None) -> Gains:
-    """Equations 3 and 4; ``fading`` holds U powers to L, U to H, U to E, then H-L and H-E."""
-    count = len(s.ue_positions)
-    power = [1.0] * (3 * count + 2) if fading is None else list(fading)
+def several(helpers: Places) -> list[Numbers]:
+    """Positions of helpers, from those of several or that of one."""
+    return [helpers] if isinstance(helpers[0], int | float) else list(helpers)  # type: ignore[list-item, arg-type]
 
-    def ground(u: int, node: Numbers, height: float) -> float:
-        length = math.hypot(height, distance(s.ue_positions[u], node))
-        return s.ground_to_air_gain / length**s.ground_to_air_exponent
 
-    to_legitimate = max(distance(helper, s.legitimate_position), 1.0)
-    to_eavesdropper = distance(helper, s.eavesdropper_positions[0])
-    climb = s.altitude - s.eavesdropper_altitude
-    return Gains(
-        g_ul=[ground(u, s.legitimate_position, s.altitude) * power[u] for u in range(count)],
-        g_uh=[ground(u, helper, s.altitude) * power[count + u] for u in range(count)],
-        g_ue=[
-            ground(u, s.eavesdropper_positions[0], s.eavesdropper_altitude) * power[2 * count + u]
-            for u in range(count)
-        ],
-        g_hl=s.air_to_air_gain / to_legitimate**2 * power[3 * count],
-        g_he=s.air_to_air_gain / (climb**2 + to_eavesdropper**2) * power[3 * count + 1],
+def gains(s: Scenario, helpers: Places, fading: Numbers | None) -> Gains:
+    """Equations 3 and 4.
+
+    ``fading`` holds powers by link: U to L, U x H, U x E, H to L, H x E, and pairs of helpers.
+    """
+    powers = None if fading is None else iter(fading)
+    places, climb = several(helpers), s.altitude - s.eavesdropper_altitude
+
+    def faded(gain: float) -> float:
+        return gain if powers is None else gain * next(powers)
+
+    def ground(ue: Numbers, node: Numbers, height: float) -> float:
+        length = math.hypot(height, distance(ue, node))
+        return faded(s.ground_to_air_gain / length**s.ground_to_air_exponent)
+
+    def level(helper: Numbers, node: Numbers) -> float:
+        return faded(s.air_to_air_gain / max(distance(helper, node), 1.0) ** 2)
+
+    def climbing(helper: Numbers, node: Numbers) -> float:
+        return faded(s.air_to_air_gain / max(climb**2 + distance(helper, node) ** 2, 1.0))
+
+    g_ul = [ground(ue, s.legitimate_position, s.altitude) for ue in s.ue_positions]
+    g_uh = [[ground(ue, place, s.altitude) for place in places] for ue in s.ue_positions]
+    g_ue = [
+        [ground(ue, node, s.eavesdropper_altitude) for node in s.eavesdropper_positions]
+        for ue in s.ue_positions
+    ]
+    g_hl = [level(place, s.legitimate_position) for place in places]
+    g_he = [[climbing(place, node) for node in s.eavesdropper_positions] for place in places]
+    g_hh = {}
+    for i in range(len(places)):
+        for j in range(i + 1, len(places)):
+            g_hh[i, j] = g_hh[j, i] = level(places[i], places[j])
+    return Gains(g_ul, g_uh, g_ue, g_hl, g_he, g_hh)
+
+
+def rates(
+    s: Scenario,
+    g: Gains,
+    u: int,
+    modes: Sequence[bool],
+    way: int,
+    power: Numbers | None = None,
+) -> tuple[float, float]:
+    """R^d_u and R^e_u of UE u that sends ``way``; ``power`` by helper in units of the nominal."""
+    share = [1.0] * len(modes) if power is None else power
+    jamming = {j: s.jamming_power * share[j] for j, relays in enumerate(modes) if not relays}
+    n_l = s.noise_power + sum(p * g.g_hl[j] for j, p in jamming.items())
+    n_e = [
+        s.noise_power + sum(p * g.g_he[j][e] for j, p in jamming.items())
+        for e in range(len(g.g_ue[u]))
+    ]
+    together = sum if s.eavesdroppers == "colluding" else max
+    if way == STRAIGHT:
+        heard = together(s.ue_power * g.g_ue[u][e] / noise for e, noise in enumerate(n_e))
+        return float(np.log2(1 + s.ue_power * g.g_ul[u] / n_l)), float(np.log2(1 + heard))
+    i = way - 1
+    p_i = s.relay_power * share[i]
+    n_i = s.noise_power + sum(p * g.g_hh[i, j] for j, p in jamming.items())
+    second_hop = (p_i * g.g_hl[i] + s.ue_power * g.g_ul[u]) / n_l
+    first_hop = s.ue_power * g.g_uh[u][i] / n_i
+    heard = together(
+        (p_i * g.g_he[i][e] + s.ue_power * g.g_ue[u][e]) / noise for e, noise in enumerate(n_e)
     )
-
-
-def rates(s: Scenario, g: Gains, u: int, mode: int) -> tuple[float, float]:
-    """R^d_u and R^e_u of the rate table."""
-    noise = s.noise_power
-    if mode == RELAY:
-        second_hop = (s.relay_power * g.g_hl + s.ue_power * g.g_ul[u]) / noise
-        first_hop = s.ue_power * g.g_uh[u] / noise
-        overheard = (s.relay_power * g.g_he + s.ue_power * g.g_ue[u]) / noise
-        legitimate = 0.5 * min(np.log2(1 + second_hop), np.log2(1 + first_hop))
-        return float(legitimate), float(0.5 * np.log2(1 + overheard))
-    at_legitimate = s.ue_power * g.g_ul[u] / (s.jamming_power * g.g_hl + noise)
-    at_eavesdropper = s.ue_power * g.g_ue[u] / (s.jamming_power * g.g_he + noise)
-    return float(np.log2(1 + at_legitimate)), float(np.log2(1 + at_eavesdropper))
+    legitimate = 0.5 * min(np.log2(1 + second_hop), np.log2(1 + first_hop))
+    return float(legitimate), float(0.5 * np.log2(1 + heard))
 
 
 def computation_energy(s: Scenario, cycles: float) -> float:
@@ -127,33 +180,59 @@ def computation_energy(s: Scenario, cycles: float) -> float:
     return s.capacitance * frequency * frequency * frequency * s.slot_duration
 
 
-def sending_energy(s: Scenario, mode: int) -> float:
+def sending_energy(s: Scenario, way: int) -> float:
     """What a UE spends on offloading, the first term of eq. 8e."""
     share = s.slot_duration / len(s.ue_positions)
-    return s.ue_power * (share / 2 if mode == RELAY else share)
+    return s.ue_power * (share if way == STRAIGHT else share / 2)
 
 
 def outcome(
-    s: Scenario, helper: Numbers, fading: Numbers | None, cycles: Numbers, mode: int
+    s: Scenario,
+    helpers: Places,
+    fading: Numbers | None,
+    cycles: Numbers,
+    modes: Sequence[bool],
+    power: Numbers | None = None,
 ) -> Outcome:
-    """Equations 5, 6, 8e, 8f and 11 for a helper that is forced into ``mode``."""
-    g = gains(s, helper, fading)
-    margins = []
-    rate, wants = [], []
+    """Equations 5, 6, 8e, 8f and 11 for helpers that are forced into ``modes``."""
+    g, places = gains(s, helpers, fading), several(helpers)
+    ways = [] if all(modes) else [STRAIGHT]
+    ways += [i for i, relays in enumerate(modes, start=1) if relays]
+    margins = [_relative(sending_energy(s, way), s.ue_energy_budget) for way in ways]
+    rate, wants, taken = [], [], []
     for u, position in enumerate(s.ue_positions):
-        legitimate, eavesdropper = rates(s, g, u, mode)
-        rate.append(max(legitimate - eavesdropper, 0.0))
-        lengths = [distance(position, s.legitimate_position)]
-        if mode == RELAY:
-            lengths.append(distance(position, helper))
-        covered = all(length <= s.coverage_radius for length in lengths)
-        affordable = sending_energy(s, mode) <= s.ue_energy_budget
-        wants.append(covered and affordable and legitimate - eavesdropper > s.min_secrecy_rate)
-        margins += [abs(length - s.coverage_radius) / s.map_side for length in lengths]
-        scale = 1.0 + legitimate + eavesdropper
-        margins.append(abs(legitimate - eavesdropper - s.min_secrecy_rate) / scale)
-    margins.append(_relative(sending_energy(s, mode), s.ue_energy_budget))
+        best: tuple[float, int] | None = None
+        first, found = 0.0, []
+        for way in ways:
+            legitimate, eavesdropper = rates(s, g, u, modes, way, power)
+            secrecy = max(legitimate - eavesdropper, 0.0)
+            first = secrecy if way == ways[0] else first
+            lengths = [distance(position, s.legitimate_position)]
+            if way != STRAIGHT:
+                lengths.append(distance(position, places[way - 1]))
+            margins += [abs(length - s.coverage_radius) / s.map_side for length in lengths]
+            scale = 1.0 + legitimate + eavesdropper
+            margins.append(abs(legitimate - eavesdropper - s.min_secrecy_rate) / scale)
+            covered = all(length <= s.coverage_radius for length in lengths)
+            if covered and sending_energy(s, way) <= s.ue_energy_budget:
+                found.append(secrecy)
+                if best is None or secrecy > best[0]:
+                    best = secrecy, way
+        found.sort(reverse=True)
+        if len(found) > 1 and found[0] > 0.0:
+            margins.append((found[0] - found[1]) / (1.0 + found[0]))
+        rate.append(first if best is None else best[0])
+        taken.append(ways[0] if best is None else best[1])
+        wants.append(best is not None and best[0] > s.min_secrecy_rate)
+    offloading = _admitted(s, rate, wants, cycles, margins)
+    total = sum(r for r, z in zip(rate, offloading, strict=True) if z)
+    return Outcome(total, offloading, rate, taken, min(margins))
 
+
+def _admitted(
+    s: Scenario, rate: list[float], wants: list[bool], cycles: Numbers, margins: list[float]
+) -> list[bool]:
+    """Equation 8f; what is compared is noted in ``margins``."""
     offloading = [False] * len(wants)
     order = sorted((u for u in range(len(wants)) if wants[u]), key=lambda u: -rate[u])
     load = 0.0
@@ -166,38 +245,53 @@ def outcome(
                 margins.append(rate[order[rank - 1]] - rate[u])
             break
         offloading[u] = True
-    total = sum(r for r, z in zip(rate, offloading, strict=True) if z)
-    return Outcome(total, offloading, rate, min(margins))
+    return offloading
+
+
+def fixed_modes(scheme: str, count: int) -> tuple[bool, ...] | None:
+    """The modes that a scheme prescribes for so many helpers; None where the best are taken."""
+    letters = {"relay": "r" * count, "jamming": "j" * count}.get(scheme, scheme)
+    return None if scheme == "hybrid" else tuple(letter == "r" for letter in letters)
 
 
 def slot(
-    s: Scenario, scheme: str, helper: Numbers, fading: Numbers | None, cycles: Numbers
+    s: Scenario,
+    scheme: str,
+    helpers: Places,
+    fading: Numbers | None,
+    cycles: Numbers,
+    power: Numbers | None = None,
 ) -> Slot:
-    """One slot with the helper in place: the mode, who offloads, and the energies."""
-    relay = outcome(s, helper, fading, cycles, RELAY)
-    jamming = outcome(s, helper, fading, cycles, JAMMING)
-    margin = min(relay.margin, jamming.margin)
-    if scheme == "hybrid":
-        mode = RELAY if relay.sum_rate > jamming.sum_rate else JAMMING
-        if relay.sum_rate > 0.0 or jamming.sum_rate > 0.0:
-            margin = min(margin, _relative(relay.sum_rate, jamming.sum_rate))
-    else:
-        mode = RELAY if scheme == "relay" else JAMMING
-    chosen = relay if mode == RELAY else jamming
-    ue_energy, edge_load, transmission = [], 0.0, 0.0
+    """One slot with the helpers in place: the modes, who offloads which way, and the energies."""
+    count = len(several(helpers))
+    vectors = [tuple(bool(n >> i & 1) for i in range(count)) for n in range(2**count)]
+    by_modes = {k: outcome(s, helpers, fading, cycles, k, power) for k in vectors}
+    margin = min(own.margin for own in by_modes.values())
+    modes = fixed_modes(scheme, count)
+    if modes is None:
+        modes = max(vectors, key=lambda k: by_modes[k].sum_rate)  # of equals the first
+        first, second = sorted((own.sum_rate for own in by_modes.values()), reverse=True)[:2]
+        if first > 0.0:
+            margin = min(margin, _relative(first, second))
+    chosen = by_modes[modes]
+    ue_energy, edge_load = [], 0.0
     for u, z in enumerate(chosen.offloading):
-        spent = sending_energy(s, mode) if z else computation_energy(s, cycles[u])
+        spent = sending_energy(s, chosen.ways[u]) if z else computation_energy(s, cycles[u])
         ue_energy.append(spent)
         margin = min(margin, _relative(spent, s.ue_energy_budget))
         edge_load += cycles[u] if z else 0.0
-        transmission += s.relay_power * s.slot_duration / (2 * len(cycles)) if z else 0.0
-    if mode == JAMMING:
-        transmission = s.jamming_power * s.slot_duration
-    return Slot(mode, chosen, relay, jamming, ue_energy, edge_load, transmission, margin)
+    transmission = []
+    for i, relays in enumerate(modes):
+        share = 1.0 if power is None else power[i]
+        ways = zip(chosen.ways, chosen.offloading, strict=True)
+        relayed = sum(way == i + 1 and z for way, z in ways)
+        relaying = relayed * s.relay_power * s.slot_duration / (2 * len(cycles))
+        transmission.append(share * (relaying if relays else s.jamming_power * s.slot_duration))
+    return Slot(modes, chosen, by_modes, ue_energy, edge_load, transmission, margin)
 
 
 def largest_transmission_energy(s: Scenario, scheme: str) -> float:
-    """The most the helper can spend on transmitting in a slot, before its mode is known."""
+    """The most that one helper can spend on transmitting in a slot, before its mode is known."""
     relay, jamming = s.relay_power * s.slot_duration / 2, s.jamming_power * s.slot_duration
     return {"relay": relay, "jamming": jamming, "hybrid": max(relay, jamming)}[scheme]
 
@@ -226,13 +320,13 @@ def flight(s: Scenario, scheme: str, position: Numbers, action: Numbers) -> Flig
     )
 
 
-def violations(s: Scenario, ue_energy: Numbers, edge_energy: float, helper_energy: float) -> int:
+def violations(s: Scenario, ue_energy: Numbers, edge_energy: float, helper_energy: Numbers) -> int:
     """How many nodes spend more than their budget."""
     room = 1.0 + 1e-4  # float32, where a budget is met exactly
     return (
         sum(spent > s.ue_energy_budget * room for spent in ue_energy)
         + (edge_energy > s.edge_energy_budget * room)
-        + (helper_energy > s.helper_energy_budget * room)
+        + sum(spent > s.helper_energy_budget * room for spent in helper_energy)
     )
 
 
@@ -252,8 +346,11 @@ def coordinates(half: float) -> st.SearchStrategy[tuple[float, float]]:
 
 
 @st.composite
-def scenarios(draw: st.DrawFn, fading: bool | None = None) -> Scenario:
-    """Random worlds around the paper's, from easy to hopeless, budgets slack and tight."""
+def scenarios(draw: st.DrawFn, fading: bool | None = None, several: bool = False) -> Scenario:
+    """Random worlds around the paper's, from easy to hopeless, budgets slack and tight.
+
+    ``several`` is for worlds of 1 to 4 helpers and 1 to 4 eavesdroppers.
+    """
     map_side = draw(st.sampled_from([64.0, 200.0, 512.0, 2000.0]))
     # Mostly around the legitimate UAV, otherwise hardly anybody would be covered.
     legitimate = draw(coordinates(map_side / 4))
@@ -264,6 +361,7 @@ def scenarios(draw: st.DrawFn, fading: bool | None = None) -> Scenario:
         tuple(min(max(c + o, -half), half) for c, o in zip(legitimate, offset, strict=True))
         for offset in offsets
     ]
+    nodes = st.lists(coordinates(half), min_size=1, max_size=4 if several else 1)
     altitude = draw(st.floats(5.0, 300.0))
     above = draw(st.sampled_from([-1.0, 1.0])) * draw(st.floats(2.0, 100.0))
     largest_task = [draw(_decades(1e3, 1e6)) for _ in range(2)]
@@ -272,8 +370,9 @@ def scenarios(draw: st.DrawFn, fading: bool | None = None) -> Scenario:
     values: dict[str, Any] = {
         "ue_positions": ues,
         "legitimate_position": legitimate,
-        "eavesdropper_positions": draw(coordinates(half)),
-        "helper_starts": draw(coordinates(half)),
+        "eavesdropper_positions": draw(nodes),
+        "helper_starts": draw(nodes),
+        "eavesdroppers": draw(st.sampled_from(["independent", "colluding"])),
         "num_slots": draw(st.integers(1, 50)),
         "slot_duration": slot_duration,
         "map_side": map_side,

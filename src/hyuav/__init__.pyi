@@ -32,7 +32,7 @@ from hyuav.physics.layout import random_layout as random_layout
 from hyuav.physics.scenario import PRESETS as PRESETS
 from hyuav.physics.scenario import Scenario as Scenario
 from hyuav.physics.slot import slot as slot
-from hyuav.references.optimum import FlightPolicy as FlightPolicy
+from hyuav.references.flight import FlightPolicy as FlightPolicy
 from hyuav.references.optimum import solve_optimum as solve_optimum
 from hyuav.references.straight import ja_lt as ja_lt
 from hyuav.references.straight import re_lt as re_lt

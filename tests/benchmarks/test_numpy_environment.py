@@ -12,7 +12,7 @@ import reference
 from benchmarks.numpy_environment import NumpyEnv
 from hyuav import Scenario, make_env
 from hyuav.physics.channel import rician_power
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.slot import Physics
 from hyuav.physics.tasks import draw_tasks
 from reference import changed, random_actions, torchrl_flight
@@ -49,7 +49,7 @@ def test_a_slot_is_the_models_slot_in_any_world(
     assert reward == pytest.approx(slot.chosen.sum_rate - penalty, rel=1e-9, abs=1e-9)
     half = scenario.map_side / 2
     distances = [d / half - 1 for d in reference.distances(scenario, flown.position)]
-    expected = [*(c / half for c in flown.position), 2 * slot.mode - 1, *distances]
+    expected = [*(c / half for c in flown.position), 2 * slot.modes[0] - 1, *distances]
     np.testing.assert_allclose(observation, expected, rtol=1e-5, atol=1e-5)
     assert not terminated
     assert truncated == (scenario.num_slots == 1)

@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDictBase
 
 from hyuav import InputError, Scenario, make_env
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.references.straight import ConstantVelocity
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
@@ -86,7 +86,7 @@ def test_without_a_compiler_the_environment_is_the_eager_one(
     monkeypatch.setenv("CXX", "no-such-compiler")
     eager, fallen_back = (
         make_env(TWO_CLUSTERS, batch_size=3, seed=4, compiled=fast).rollout(
-            20, ConstantVelocity(TWO_CLUSTERS, (0.0, 0.0), "jamming")
+            20, ConstantVelocity(TWO_CLUSTERS, [(0.0, 0.0)], "jamming")
         )
         for fast in (False, True)
     )

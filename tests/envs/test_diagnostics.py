@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from hyuav import Scenario, SecureOffloadingEnv
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 
 RANDOM_DISK = Scenario.preset("random_disk")
 QUIET = dataclasses.replace(RANDOM_DISK, fading=False)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import reference
 from hyuav import Scenario, SecureOffloadingEnv
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.slot import Control, Physics, slot
 from reference import assert_same, changed, fly, place, start_at
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from hyuav import InputError, Scenario, SecureOffloadingEnv
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from reference import assert_same, changed, fly, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")

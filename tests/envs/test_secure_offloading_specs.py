@@ -10,7 +10,7 @@ from torchrl.collectors import Collector
 from torchrl.envs.utils import check_env_specs
 
 from hyuav import InputError, InputTypeError, Scenario, SecureOffloadingEnv
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from reference import changed, fly, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")

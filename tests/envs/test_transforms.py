@@ -11,7 +11,7 @@ from torchrl.collectors import Collector
 from torchrl.envs.utils import check_env_specs
 
 from hyuav import InputError, Scenario, SecureOffloadingEnv, make_env
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.slot import Control, slot
 from reference import assert_same, fly, place, start_at
 

@@ -25,7 +25,8 @@ from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.robust import RobustTD3
 from hyuav.learning.policy import learned_policy
 from hyuav.learning.weights import copy_weights
-from hyuav.references.optimum import FlightPolicy, solve_optimum
+from hyuav.references.flight import FlightPolicy
+from hyuav.references.optimum import solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)

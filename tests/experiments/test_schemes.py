@@ -1,5 +1,5 @@
 from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, OPTIMA, SCHEMES
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 
 
 def test_every_mode_rule_is_learned_twice_and_has_an_optimum() -> None:

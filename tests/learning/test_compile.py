@@ -15,7 +15,7 @@ from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.torchrl_internals import next_observation
 from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.training import Training, TrainingParameters
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 FADELESS = dataclasses.replace(SCENARIO, fading=False, edge_energy_budget=8.0, speed_limit="disc")

@@ -63,11 +63,10 @@ def test_a_ue_sends_for_its_share_of_the_slot_and_for_half_of_it_to_a_relay(
     assert half == pytest.approx(whole / 2)
 
 
-def test_relaying_costs_half_a_share_of_the_slot_for_each_offloading_ue() -> None:
-    offloading = torch.tensor([[True, True, False, True], [False] * 4, [True] * 4])
-    found = energy.relay_energy(offloading, 0.012, 2.0)
-    assert found.shape == (3, 1)
-    assert found.flatten().tolist() == pytest.approx([3 * 0.012 * 2 / 8, 0.0, 0.012])
+def test_relaying_costs_half_a_share_of_the_slot_for_each_ue_that_sends_through_a_helper() -> None:
+    found = energy.relay_energy(torch.tensor([[3, 0], [0, 4]]), 0.012, 2.0 / 4)
+    expected = torch.tensor([[3 * 0.012 * 2 / 8, 0.0], [0.0, 0.012]])
+    torch.testing.assert_close(found, expected)
 
 
 def test_jamming_lasts_the_whole_slot() -> None:

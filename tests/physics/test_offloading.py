@@ -1,4 +1,4 @@
-"""Coverage, the offloading decision, the edge server's admission and the mode."""
+"""Coverage, the offloading decision and the edge server's admission."""
 
 import pytest
 import torch
@@ -10,29 +10,9 @@ from hyuav.physics import offloading
 INSIDE, EDGE, OUTSIDE = 10.0, 45.0, 45.001
 
 
-@pytest.mark.parametrize(
-    ("to_helper", "to_legitimate", "covered"),
-    [
-        (INSIDE, INSIDE, True),
-        (INSIDE, OUTSIDE, False),
-        (OUTSIDE, INSIDE, False),
-        (OUTSIDE, OUTSIDE, False),
-        (EDGE, EDGE, True),
-        (EDGE, OUTSIDE, False),
-    ],
-)
-def test_relaying_needs_both_uavs_within_reach(
-    to_helper: float, to_legitimate: float, covered: bool
-) -> None:
-    found = offloading.covered_by_relay(
-        torch.tensor([to_helper]), torch.tensor([to_legitimate]), 45.0
-    )
-    assert found.tolist() == [covered]
-
-
-def test_jamming_needs_only_the_legitimate_uav_within_reach() -> None:
+def test_a_ue_on_the_edge_of_the_coverage_is_covered() -> None:
     distances = torch.tensor([INSIDE, EDGE, OUTSIDE])
-    assert offloading.covered_by_legitimate(distances, 45.0).tolist() == [True, True, False]
+    assert offloading.covered(distances, 45.0).tolist() == [True, True, False]
 
 
 def test_a_ue_offloads_where_it_is_allowed_and_its_secrecy_rate_exceeds_the_limit() -> None:
@@ -45,11 +25,6 @@ def test_without_a_limit_any_positive_secrecy_rate_suffices() -> None:
     rate = torch.tensor([1e-6, 0.0])
     allowed = torch.tensor([True, True])
     assert offloading.offloading_decision(rate, allowed, 0.0).tolist() == [True, False]
-
-
-def test_relaying_needs_a_strictly_larger_sum_rate() -> None:
-    relay, jamming = torch.tensor([2.0, 1.0, 1.0, 0.0]), torch.tensor([1.0, 2.0, 1.0, 0.0])
-    assert offloading.prefers_relay(relay, jamming).tolist() == [True, False, False, False]
 
 
 def admit(wants: list[bool], rates: list[float], cycles: list[float], budget: float) -> list[bool]:

@@ -12,7 +12,7 @@ import reference
 from hyuav import Scenario
 from hyuav.physics import rates as secrecy
 from hyuav.physics.channel import LinkRow, Links
-from hyuav.physics.rates import AchievableRates
+from hyuav.physics.rates import AchievableRates, Sent
 
 GAIN = st.floats(-14.0, -2.0).map(lambda exponent: 10.0**exponent)
 SNR = st.floats(-6.0, 6.0).map(lambda exponent: 10.0**exponent)
@@ -32,14 +32,26 @@ def gains_of(*values: float, dtype: torch.dtype = torch.float64) -> Links:
     return LinkRow(1, 1, 1).unflatten(row)
 
 
+def relaying(gains: Links, ue: float, helper: float, noise: float) -> AchievableRates:
+    """The rates through the one helper, at powers in W."""
+    power = torch.tensor([helper / noise], dtype=gains.helper_legitimate.dtype)
+    return secrecy.relay_rates(gains, Sent(ue / noise, power, power), 0, [], "independent")
+
+
+def jamming(gains: Links, ue: float, helper: float, noise: float) -> AchievableRates:
+    """The rates of the straight links while the one helper jams, at powers in W."""
+    power = torch.tensor([helper / noise], dtype=gains.helper_legitimate.dtype)
+    return secrecy.straight_rates(gains, Sent(ue / noise, power, power), [0], "independent")
+
+
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_the_rates_of_the_first_ue_of_two_clusters(dtype: torch.dtype) -> None:
     gains = gains_of(*FIRST_UE, dtype=dtype)
-    relay = secrecy.relay_rates(gains, 0.1, 0.012, 1e-13)
-    jamming = secrecy.jamming_rates(gains, 0.1, 0.08, 1e-13)
-    found = [float(rate) for rates in (relay, jamming) for rate in both(rates)]
+    relay = relaying(gains, 0.1, 0.012, 1e-13)
+    straight = jamming(gains, 0.1, 0.08, 1e-13)
+    found = [float(rate) for rates in (relay, straight) for rate in both(rates)]
     assert found == pytest.approx([4.937287, 4.799333, 0.082177, 0.194327], rel=5e-6)
-    assert {rate.dtype for rates in (relay, jamming) for rate in both(rates)} == {dtype}
+    assert {rate.dtype for rates in (relay, straight) for rate in both(rates)} == {dtype}
 
 
 @given(st.tuples(GAIN, GAIN, GAIN, GAIN, GAIN), POWER, POWER, st.floats(-16.0, -9.0))
@@ -57,13 +69,15 @@ def test_the_rates_are_those_of_the_rate_table(
         jamming_power=helper_power,
         noise_power=noise,
     )
-    expected_gains = reference.Gains([values[0]], [values[1]], [values[2]], values[3], values[4])
+    expected_gains = reference.Gains(
+        [values[0]], [[values[1]]], [[values[2]]], [values[3]], [[values[4]]], {}
+    )
     gains = gains_of(*values)
-    for mode, found in (
-        (reference.RELAY, secrecy.relay_rates(gains, ue_power, helper_power, noise)),
-        (reference.JAMMING, secrecy.jamming_rates(gains, ue_power, helper_power, noise)),
+    for mode, way, found in (
+        (reference.RELAY, 1, relaying(gains, ue_power, helper_power, noise)),
+        (reference.JAMMING, reference.STRAIGHT, jamming(gains, ue_power, helper_power, noise)),
     ):
-        expected = reference.rates(scenario, expected_gains, 0, mode)
+        expected = reference.rates(scenario, expected_gains, 0, mode, way)
         assert [float(rate) for rate in both(found)] == pytest.approx(expected, rel=1e-9, abs=1e-14)
 
 
@@ -76,23 +90,23 @@ def test_a_tiny_signal_has_a_rate_proportional_to_its_snr(dtype: torch.dtype) ->
 
 def test_a_helper_that_cannot_decode_cannot_relay() -> None:
     deaf = gains_of(1e-9, 0.0, 1e-10, 1e-8, 1e-9)
-    assert float(secrecy.relay_rates(deaf, 0.1, 0.012, 1e-13).legitimate) == 0.0
+    assert float(relaying(deaf, 0.1, 0.012, 1e-13).legitimate) == 0.0
 
 
 def test_a_silent_helper_leaves_the_direct_link_at_half_and_at_full_rate() -> None:
     gains = gains_of(1e-9, 1e-3, 1e-10, 1e-8, 1e-9)
-    relay = secrecy.relay_rates(gains, 0.1, 0.0, 1e-13)
-    jamming = secrecy.jamming_rates(gains, 0.1, 0.0, 1e-13)
-    assert float(jamming.legitimate) == pytest.approx(math.log2(1 + 1e-10 / 1e-13))
-    assert float(jamming.eavesdropper) == pytest.approx(math.log2(1 + 1e-11 / 1e-13))
-    assert float(relay.legitimate) == pytest.approx(float(jamming.legitimate) / 2)
-    assert float(relay.eavesdropper) == pytest.approx(float(jamming.eavesdropper) / 2)
+    relay = relaying(gains, 0.1, 0.0, 1e-13)
+    straight = jamming(gains, 0.1, 0.0, 1e-13)
+    assert float(straight.legitimate) == pytest.approx(math.log2(1 + 1e-10 / 1e-13))
+    assert float(straight.eavesdropper) == pytest.approx(math.log2(1 + 1e-11 / 1e-13))
+    assert float(relay.legitimate) == pytest.approx(float(straight.legitimate) / 2)
+    assert float(relay.eavesdropper) == pytest.approx(float(straight.eavesdropper) / 2)
 
 
 def test_without_transmit_power_there_is_no_rate() -> None:
     for rates in (
-        secrecy.relay_rates(gains_of(*FIRST_UE), 0.0, 0.0, 1e-13),
-        secrecy.jamming_rates(gains_of(*FIRST_UE), 0.0, 0.0, 1e-13),
+        relaying(gains_of(*FIRST_UE), 0.0, 0.0, 1e-13),
+        jamming(gains_of(*FIRST_UE), 0.0, 0.0, 1e-13),
     ):
         assert [float(rate) for rate in both(rates)] == [0.0, 0.0]
 
@@ -101,9 +115,9 @@ def test_without_transmit_power_there_is_no_rate() -> None:
 def test_jamming_hurts_the_receiver_it_reaches_better(power: float) -> None:
     near_e = gains_of(1e-9, 1e-9, 1e-9, 1e-9, 1e-6)
     near_l = gains_of(1e-9, 1e-9, 1e-9, 1e-6, 1e-9)
-    rates = secrecy.jamming_rates(near_e, 0.1, power, 1e-13)
+    rates = jamming(near_e, 0.1, power, 1e-13)
     assert float(rates.legitimate) > float(rates.eavesdropper)
-    rates = secrecy.jamming_rates(near_l, 0.1, power, 1e-13)
+    rates = jamming(near_l, 0.1, power, 1e-13)
     assert float(rates.legitimate) < float(rates.eavesdropper)
 
 
@@ -134,13 +148,13 @@ def test_only_offloading_ues_add_to_the_secrecy_sum_rate() -> None:
     assert secrecy.secrecy_sum_rate(rate, offloading).tolist() == [5.0, 0.0]
 
 
-@pytest.mark.parametrize("mode", [secrecy.relay_rates, secrecy.jamming_rates])
+@pytest.mark.parametrize("mode", [relaying, jamming])
 def test_rates_are_differentiable_in_every_gain(mode: Callable[..., AchievableRates]) -> None:
     # In units where gains are of order one; noise follows.
-    values = [gain.requires_grad_() for gain in gains_of(2, 3, 5, 7, 11)]
+    values = [gain.requires_grad_() for gain in gains_of(2, 3, 5, 7, 11)[:5]]
 
     def rates(*gains: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        return both(mode(Links(*gains), 1.3, 0.7, 0.5))
+        return both(mode(Links(*gains, torch.empty(0)), 1.3, 0.7, 0.5))
 
     assert torch.autograd.gradcheck(rates, values)
 
@@ -152,6 +166,7 @@ def test_one_helper_gain_serves_all_ues_of_a_batch() -> None:
         torch.full((10, 1), 1e-10),
         torch.full((4, 3, 1), 1e-8),
         torch.full((4, 3, 1, 1), 1e-8),
+        torch.empty(4, 3, 0),
     )
-    assert secrecy.relay_rates(gains, 0.1, 0.01, 1e-13).legitimate.shape == (4, 3, 10)
-    assert secrecy.jamming_rates(gains, 0.1, 0.01, 1e-13).legitimate.shape == (4, 3, 10)
+    assert relaying(gains, 0.1, 0.01, 1e-13).legitimate.shape == (4, 3, 10)
+    assert jamming(gains, 0.1, 0.01, 1e-13).legitimate.shape == (4, 3, 10)

@@ -123,7 +123,8 @@ def test_an_unknown_preset_is_answered_with_the_closest() -> None:
 
 def test_every_parameter_of_the_paper_has_its_symbol_and_unit() -> None:
     metadata = {field.name: field.metadata for field in dataclasses.fields(Scenario)}
-    own = {"fading", "speed_limit"}  # this project's switches have no symbol in the paper
+    # This project's switches have no symbol in the paper.
+    own = {"fading", "speed_limit", "eavesdroppers", "power_control"}
     assert {name for name in FIELDS if not metadata[name]["symbol"]} == own
     symbols = [metadata[name]["symbol"] for name in FIELDS if name not in own]
     assert len(set(symbols)) == len(symbols)
@@ -276,9 +277,19 @@ def test_every_node_lies_on_the_map(name: str, axis: int, beyond: float, sign: i
 
 @pytest.mark.parametrize("name", NODES)
 @pytest.mark.parametrize("value", [[(1, 2), (3, 4)], np.zeros((2, 2)), torch.zeros(3, 2)])
-def test_there_is_one_helper_and_one_eavesdropper(name: str, value: Any) -> None:
-    assert refused(name, value).endswith("expected the position (x, y) of one node")
-    refused(name, [])
+def test_there_may_be_several_helpers_and_eavesdroppers(name: str, value: Any) -> None:
+    nodes = getattr(dataclasses.replace(TWO_CLUSTERS, **{name: value}), name)
+    assert nodes == tuple((float(x), float(y)) for x, y in value)
+
+
+@pytest.mark.parametrize("name", NODES)
+@pytest.mark.parametrize("value", [[], (1.0, 2.0, 3.0), [1.0, 2.0, 3.0], [(1.0, 2.0), 3.0]])
+def test_several_nodes_are_pairs_of_coordinates(name: str, value: Any) -> None:
+    refused(name, value)
+
+
+def test_there_are_at_most_six_helpers() -> None:
+    assert refused("helper_starts", [(0, 0)] * 7).endswith("of 1 to 6 helpers")
 
 
 @pytest.mark.parametrize("old", ["helper_start", "eavesdropper_position"])

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import reference
 from hyuav import Scenario
-from hyuav.physics.energy import budget_speed
+from hyuav.physics.energy import budget_speeds
 from hyuav.physics.layout import Nodes
-from hyuav.physics.offloading import MODE_RULES, ModeRule
+from hyuav.physics.modes import MODE_RULES, ModeRule
 from hyuav.physics.scenario import PRESETS
 from hyuav.physics.slot import Control, Geometry, Physics, slot
 from hyuav.physics.tasks import Tasks, draw_tasks, mean_tasks
@@ -37,6 +37,11 @@ def geometry(physics: Physics, position: Any) -> Geometry:
 def tasks_of(cycles: list[float]) -> Tasks:
     size = torch.tensor(cycles, dtype=torch.float64)
     return Tasks(size, torch.ones_like(size))
+
+
+def nearly(rows: list[list[float]]) -> list[Any]:
+    """Rows of numbers, to be compared with others up to rounding."""
+    return [pytest.approx(row, rel=1e-12) for row in rows]
 
 
 def random_slot(
@@ -82,7 +87,7 @@ def test_the_secrecy_sum_rates_of_both_layouts_without_fading(
 
 def test_the_gains_of_the_first_ue_of_two_clusters() -> None:
     gains = geometry(double(without_fading("two_clusters")), [-40.0, -40.0]).gains
-    values = [float(gain.flatten()[0]) for gain in gains]
+    values = [float(gain.flatten()[0]) for gain in gains[:5]]
     expected = [1.465416e-09, 9.377344e-10, 3.795931e-10, 3.125000e-08, 3.289474e-09]
     assert values == pytest.approx(expected, rel=1e-6)
 
@@ -107,10 +112,10 @@ def test_the_gains_are_those_of_scalar_loops(
     found = geometry(physics, helper).gains.faded(links)
     expected = reference.gains(scenario, helper, powers)
     assert reference.as_list(found.ue_legitimate) == pytest.approx(expected.g_ul, rel=1e-12)
-    assert reference.as_list(found.ue_helper) == pytest.approx(expected.g_uh, rel=1e-12)
-    assert reference.as_list(found.ue_eavesdropper) == pytest.approx(expected.g_ue, rel=1e-12)
-    assert float(found.helper_legitimate) == pytest.approx(expected.g_hl, rel=1e-12)
-    assert float(found.helper_eavesdropper) == pytest.approx(expected.g_he, rel=1e-12)
+    assert found.ue_helper.tolist() == nearly(expected.g_uh)
+    assert found.ue_eavesdropper.tolist() == nearly(expected.g_ue)
+    assert reference.as_list(found.helper_legitimate) == pytest.approx(expected.g_hl, rel=1e-12)
+    assert found.helper_eavesdropper.tolist() == nearly(expected.g_he)
 
 
 @given(reference.scenarios(), st.data(), SEEDS)
@@ -226,7 +231,7 @@ def test_the_mode_rule_says_which_mode_counts() -> None:
     relay, jamming = (getattr(hover(physics, at), mode).sum_rate for mode in ("relay", "jamming"))
     expected = {"hybrid": relay.maximum(jamming), "relay": relay, "jamming": jamming}
     for name in MODE_RULES:
-        found = hover(physics, at, mode_rule=ModeRule.of([name]))
+        found = hover(physics, at, mode_rule=ModeRule.of([name], 1))
         assert torch.equal(found.sum_rate.squeeze(-1), expected[name])
 
 
@@ -236,15 +241,15 @@ def test_the_speed_that_the_budget_of_a_scheme_allows() -> None:
     )
     physics = double(scenario)
     for scheme, transmission in (("relay", 0.006), ("jamming", 10.0), ("hybrid", 10.0)):
-        flight = 0.5 * 9.65 * budget_speed(physics.scenario, scheme) ** 2
+        flight = 0.5 * 9.65 * budget_speeds(physics.scenario, scheme)[0] ** 2
         assert flight + transmission == pytest.approx(100.0)
 
 
 def test_a_budget_below_the_transmission_energy_leaves_no_flight() -> None:
     scenario = dataclasses.replace(Scenario.preset("two_clusters"), helper_energy_budget=0.01)
     physics = double(scenario)
-    assert budget_speed(physics.scenario, "jamming") == 0.0
-    assert budget_speed(physics.scenario, "relay") > 0.0
+    assert budget_speeds(physics.scenario, "jamming")[0] == 0.0
+    assert budget_speeds(physics.scenario, "relay")[0] > 0.0
     limit = physics.norm_limit(["jamming"])
     for action in (torch.ones(1, 2, dtype=torch.float64), torch.zeros(1, 2, dtype=torch.float64)):
         assert not physics.velocity(action, limit).any()
@@ -380,9 +385,9 @@ def test_the_path_loss_exponent_of_the_ues_links_is_that_of_scalar_loops(exponen
     physics, helper = double(scenario), (-49.0, 6.0)
     found, expected = geometry(physics, helper).gains, reference.gains(scenario, helper, None)
     assert reference.as_list(found.ue_legitimate) == pytest.approx(expected.g_ul, rel=1e-12)
-    assert reference.as_list(found.ue_helper) == pytest.approx(expected.g_uh, rel=1e-12)
-    assert reference.as_list(found.ue_eavesdropper) == pytest.approx(expected.g_ue, rel=1e-12)
-    assert float(found.helper_legitimate) == pytest.approx(expected.g_hl, rel=1e-12)
+    assert found.ue_helper.tolist() == nearly(expected.g_uh)
+    assert found.ue_eavesdropper.tolist() == nearly(expected.g_ue)
+    assert reference.as_list(found.helper_legitimate) == pytest.approx(expected.g_hl, rel=1e-12)
     assert Scenario.preset("two_clusters").ground_to_air_exponent == 2.0
 
 

@@ -7,18 +7,12 @@ import pytest
 import torch
 
 from hyuav import InputError, Scenario, make_env
-from hyuav.physics.energy import budget_speed
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.energy import budget_speeds
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS
 from hyuav.physics.slot import Control, Physics, slot
-from hyuav.references.optimum import (
-    RESOLUTION,
-    FlightPolicy,
-    Optimum,
-    _flyable,
-    solve_horizons,
-    solve_optimum,
-)
+from hyuav.references.flight import FlightPolicy, flyable
+from hyuav.references.optimum import RESOLUTION, Optimum, solve_horizons, solve_optimum
 
 REFERENCE = {
     "random_disk": {20: (60.183, 38.107, 56.905)},
@@ -86,7 +80,7 @@ def brute_force(scenario: Scenario, scheme: str, resolution: float) -> float:
     relay, jamming = slots.relay.sum_rate, slots.jamming.sum_rate
     rewards = {"relay": relay, "jamming": jamming, "hybrid": torch.maximum(relay, jamming)}
     reward = dict(zip(points, rewards[scheme].tolist(), strict=True))
-    norm = budget_speed(scenario, scheme)
+    norm = budget_speeds(scenario, scheme)[0]
     if scenario.speed_limit == "disc":
         norm = min(norm, scenario.max_speed)
 
@@ -200,7 +194,7 @@ def test_a_position_on_the_edge_of_coverage_or_map_is_flown_just_inside() -> Non
     )
     edge = (0.3 + radius * 0.6, 0.7 + radius * 0.8)
     path = torch.tensor([[(10.0, 20.0)], [edge], [(35.0, 40.0)], [corner]], dtype=torch.float64)
-    flown = _flyable(path, Physics(scenario, dtype=torch.float64), "hybrid")
+    flown = flyable(path, Physics(scenario, dtype=torch.float64), "hybrid")
     assert (flown - path).abs().max() < 2e-4
     assert torch.dist(flown[1, 0], torch.tensor([0.3, 0.7], dtype=torch.float64)) < radius - 1e-5
     assert flown[3].max() < 50.0 - 1e-5

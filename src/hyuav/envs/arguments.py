@@ -8,8 +8,8 @@ from typing import Any, TypeGuard
 import torch
 from torch import Tensor
 
-from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
-from hyuav.physics.offloading import MODE_RULES
+from hyuav._support.errors import InputError, InputTypeError, rejection
+from hyuav.physics.modes import MODE_RULES, fixed_modes
 from hyuav.physics.scenario import Point, Scenario
 
 LAYOUT = ("ue_positions", "legitimate_position", "helper_starts", "eavesdropper_positions")
@@ -79,15 +79,17 @@ def as_batch_size(batch_size: int | Sequence[int]) -> torch.Size:
     return torch.Size(sizes)
 
 
-def as_schemes(scheme: str | Sequence[str], batch_size: torch.Size) -> tuple[str, ...]:
+def as_schemes(
+    scheme: str | Sequence[str], batch_size: torch.Size, num_helpers: int
+) -> tuple[str, ...]:
     """One scheme for all rows, or one for each row of the batch's first dimension."""
     if isinstance(scheme, str):
-        require_choice("scheme", scheme, MODE_RULES)
+        fixed_modes(scheme, num_helpers)
         return (scheme,)
     if not isinstance(scheme, Sequence):
         raise InputTypeError(rejection("scheme", scheme, f"one of {', '.join(MODE_RULES)}"))
     for index, name in enumerate(scheme):
-        require_choice(f"scheme[{index}]", name, MODE_RULES)
+        fixed_modes(name, num_helpers, f"scheme[{index}]")
     if not batch_size or len(scheme) != batch_size[0]:
         rows = batch_size[0] if batch_size else 0
         raise InputError(rejection("scheme", scheme, f"one name, or one for each of {rows} rows"))

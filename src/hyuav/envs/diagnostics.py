@@ -16,7 +16,8 @@ def diagnostics_spec(batch_size: torch.Size, scenario: Scenario, device: torch.d
 
     - ``offloading`` (U,) bool: z_u, the UEs that offload.
     - ``secrecy_rate`` (U,) bps/Hz: of the UEs that offload, 0 for the others.
-    - ``relay_sum_rate``, ``jamming_sum_rate`` (1,) bps/Hz: C_1 and C_0, whatever the mode.
+    - ``relay_sum_rate``, ``jamming_sum_rate`` (1,) bps/Hz: what all helpers relaying and all
+      jamming would bring, C_1 and C_0, whatever the modes.
     - ``ue_energy`` (U,) J: of transmitting, or of local execution where a UE does not offload.
     - ``edge_load`` (1,) cycle: taken in this slot, computed in the next.
     - ``edge_energy`` (1,) J: of computing what was taken in the previous slot.
@@ -54,19 +55,23 @@ def diagnose(
         edge_load: (..., 1) cycles that the edge server took in the previous slot.
     """
     cpu_cycles, offloading = tasks.cpu_cycles, slot.offloading
-    duration, num_ues, power = scenario.slot_duration, scenario.num_ues, slot.control.power
+    duration, num_ues = scenario.slot_duration, scenario.num_ues
+    power = 1.0 if slot.control.power is None else slot.control.power
+    relays, way = slot.relays, slot.way
     sending = torch.where(
-        slot.relays,
+        way > 0,
         energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=True),
         energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=False),
     )
     local = energy.computation_energy(cpu_cycles / duration, scenario.capacitance, duration)
     ue_energy = torch.where(offloading, sending, local)
     edge_energy = energy.computation_energy(edge_load / duration, scenario.capacitance, duration)
-    transmitting = torch.where(
-        slot.relays,
-        energy.relay_energy(offloading, scenario.relay_power * power, duration),
-        energy.jamming_energy(scenario.jamming_power * power, duration),
+    helpers = torch.arange(1, scenario.num_helpers + 1, device=way.device)
+    relayed = ((way * offloading).unsqueeze(-1) == helpers).sum(dim=-2)
+    transmitting = power * torch.where(
+        relays,
+        energy.relay_energy(relayed, scenario.relay_power, duration / num_ues),
+        energy.jamming_energy(scenario.jamming_power, duration),
     )
     flying = energy.flight_energy(slot.control.velocity, scenario.helper_mass, duration)
     helper_energy = flying + transmitting
@@ -85,7 +90,7 @@ def diagnose(
         edge_energy=edge_energy,
         helper_energy=helper_energy,
         budget_violation=violations,
-        batch_size=slot.relays.shape[:-1],
+        batch_size=relays.shape[:-1],
         device=edge_load.device,
     )
 

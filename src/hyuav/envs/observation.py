@@ -15,7 +15,8 @@ class ObservationLayout:
 
     An observation holds, in this order, the positions of the helpers (2 H), their modes (H) and
     their distances to the UEs, L and the eavesdroppers (H (U + 1 + E)), and with a clock the
-    slots flown. An action holds the helpers' velocities (2 H). All are of order one.
+    slots flown. An action holds the helpers' velocities (2 H), each followed by the power where
+    that is controlled (3 H). All are of order one.
 
     Args:
         scenario: that is flown; it tells the numbers U of UEs, H of helpers, E of eavesdroppers.
@@ -25,7 +26,7 @@ class ObservationLayout:
     def __init__(self, scenario: Scenario, *, clock: bool) -> None:
         self.num_helpers = scenario.num_helpers
         """H."""
-        self.action_size = 2 * self.num_helpers
+        self.action_size = self.num_helpers * scenario.action_size
         """Numbers of an action."""
         self.num_distances = scenario.num_ues + 1 + scenario.num_eavesdroppers
         """Of one helper."""
@@ -38,7 +39,7 @@ class ObservationLayout:
         Args:
             observation: (..., size).
         """
-        return observation[..., : self.action_size]
+        return observation[..., : 2 * self.num_helpers]
 
     def clock(self, observation: Tensor) -> Tensor:
         """The slots flown, from -1 (none) to 1 (all): (..., 1).
@@ -67,7 +68,7 @@ class JointView(Transform):
     by constants alone: coordinates are divided by half the map's side, a mode becomes -1 (jamming)
     or 1 (relay), and distances from 0 to the map's side become -1 to 1. With a clock, the slots
     flown follow, from -1 (none) to 1 (all). On its way to the environment, ``action`` (2 H,) gets
-    the helper's axis, (H, 2).
+    the helper's axis, (H, 2); with power control these are 3 for each helper.
 
     Args:
         scenario: its nodes, map and horizon.
@@ -110,7 +111,7 @@ class JointView(Transform):
         """Give the action that the environment takes the helper's axis."""
         action = tensordict["action"]
         require_shape("action", action, (*tensordict.batch_size, self.layout.action_size))
-        tensordict["action"] = torch.unflatten(action, -1, (self.layout.num_helpers, 2))
+        tensordict["action"] = torch.unflatten(action, -1, (self.layout.num_helpers, -1))
         return tensordict
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hyuav._support.errors import InputError, rejection
 from hyuav.physics.channel import horizontal_distance
-from hyuav.physics.offloading import covered_by_legitimate, covered_by_relay
+from hyuav.physics.offloading import covered
 from hyuav.physics.scenario import Point, Scenario
 
 OKABE_ITO = {
@@ -191,10 +191,10 @@ def _covered(scenario: Scenario, helper: Point, *, relay: bool) -> NDArray[np.bo
     """Eq. 5 with the helper at ``helper``: (U,)."""
     ues, radius = torch.tensor(scenario.ue_positions), scenario.coverage_radius
     to_legitimate = horizontal_distance(ues, torch.tensor(scenario.legitimate_position))
-    if not relay:
-        return covered_by_legitimate(to_legitimate, radius).numpy()
-    to_helper = horizontal_distance(ues, torch.tensor(helper))
-    return covered_by_relay(to_helper, to_legitimate, radius).numpy()
+    reached = covered(to_legitimate, radius)
+    if relay:
+        reached &= covered(horizontal_distance(ues, torch.tensor(helper)), radius)
+    return reached.numpy()
 
 
 def _draw_ues(axes: Axes, positions: NDArray[np.float64], face: str, label: str) -> None:

@@ -23,7 +23,7 @@ from hyuav.envs.arguments import (
 from hyuav.envs.diagnostics import diagnose, diagnostics_spec
 from hyuav.envs.draws import Draws
 from hyuav.physics.layout import Nodes
-from hyuav.physics.offloading import ModeRule
+from hyuav.physics.modes import ModeRule
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Control, Physics, SlotOutcome, slot
 from hyuav.physics.tasks import Tasks
@@ -34,7 +34,7 @@ class SecureOffloadingEnv(EnvBase):
 
     Time is not limited here (:func:`hyuav.make_env` truncates after T slots) and no state is
     terminal. All entries are physical and have the batch size in front; U is the number of UEs, H
-    of helpers and E of eavesdroppers. For the time being H and E are 1.
+    of helpers and E of eavesdroppers.
 
     Observation:
         - ``position`` (H, 2) float32, m: the helpers', within the map.
@@ -49,7 +49,8 @@ class SecureOffloadingEnv(EnvBase):
 
     Action:
         - ``action`` (H, 2) float32 in [-1, 1]: the velocity in units of v_max. It is clipped, then
-          shortened to the speed limit and to the helper's energy budget.
+          shortened to the speed limit and to the helper's energy budget. With ``power_control``
+          (H, 3): the last number is the power, from the least (-1) to the nominal (1), in dB.
 
     Reward:
         - ``reward`` (1,) float32, bps/Hz: the secrecy sum-rate of the slot (eq. 6), before any
@@ -63,8 +64,8 @@ class SecureOffloadingEnv(EnvBase):
         scenario: node positions and parameters, the name of a preset, or UE positions such as
             :func:`hyuav.disk` draws; or a list of these, one for each row of the batch's first
             dimension, which differ in positions only.
-        scheme: "hybrid", "relay" or "jamming"; or one of these for each row of the batch's
-            first dimension.
+        scheme: "hybrid", "relay", "jamming", or a letter r or j for each helper; or one of these
+            for each row of the batch's first dimension.
         batch_size: of the helpers flown at once; where it is left out, a row for each scenario of
             a list.
         device: of all tensors.
@@ -99,17 +100,17 @@ class SecureOffloadingEnv(EnvBase):
         super().__init__(device=as_device(device), batch_size=batch)
         self.scenarios = scenarios
         self.physics = Physics(self.scenarios[0], self.device, nodes=self._layout())
-        self.schemes = as_schemes(scheme, self.batch_size)
+        self.schemes = as_schemes(scheme, self.batch_size, self.scenario.num_helpers)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
-        rules = ModeRule.of(self.schemes, self.device)
+        rules = ModeRule.of(self.schemes, self.scenario.num_helpers, self.device)
         self._mode_rule = ModeRule(
             *(self._per_row(torch.as_tensor(flags, device=self.device)) for flags in rules)
         )
         norm_limit = self.physics.norm_limit(self.schemes)
         self._norm_limit = None
         if norm_limit is not None:
-            self._norm_limit = self._per_row(norm_limit).unsqueeze(-2)  # the helpers' axis
+            self._norm_limit = self._per_row(norm_limit).unsqueeze(-1)
         self._make_specs()
         self.draws: Draws
         if isinstance(seed, list | tuple):
@@ -150,8 +151,8 @@ class SecureOffloadingEnv(EnvBase):
         def numbers(*shape: int) -> Unbounded:
             return Unbounded((*batch, *shape), dtype=torch.float32, device=device)
 
-        def bounded(bound: float) -> Bounded:
-            shape = (*batch, num_helpers, 2)
+        def bounded(bound: float, size: int = 2) -> Bounded:
+            shape = (*batch, num_helpers, size)
             return Bounded(-bound, bound, shape, dtype=torch.float32, device=device)
 
         self.observation_spec = Composite(
@@ -175,7 +176,7 @@ class SecureOffloadingEnv(EnvBase):
             self.state_spec["diagnostics"] = Composite(
                 edge_load=edge_load, shape=batch, device=device
             )
-        self.action_spec = bounded(1.0)
+        self.action_spec = bounded(1.0, self.scenario.action_size)
         self.reward_spec = numbers(1)
         self.done_spec = Composite(done=flags(1), terminated=flags(1), shape=batch, device=device)
 
@@ -185,7 +186,8 @@ class SecureOffloadingEnv(EnvBase):
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
         position = self.start(tensordict)
         # What is found at the start is what a slot brings in which the helpers stay there.
-        after_reset = self._slot(position, torch.zeros_like(position))[0]
+        staying = Control(torch.zeros_like(position), self._mode_rule)
+        after_reset = self._slot(position, staying)[0]
         if self.diagnostics:
             after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
         return after_reset
@@ -210,10 +212,10 @@ class SecureOffloadingEnv(EnvBase):
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         position, action = tensordict["position"], tensordict["action"]
-        require_shape("action", action, position.shape)
+        require_shape("action", action, (*position.shape[:-1], self.scenario.action_size))
         action = action.to(torch.float32)  # as specified, whatever is given
-        velocity = self.physics.velocity(action, self._norm_limit)
-        after, outcome, tasks = self._slot(position, velocity)
+        control = self.physics.control(action, self._norm_limit, self._mode_rule)
+        after, outcome, tasks = self._slot(position, control)
         after["reward"] = reward = outcome.sum_rate
         after["done"] = torch.zeros_like(reward, dtype=torch.bool)
         after["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
@@ -224,14 +226,14 @@ class SecureOffloadingEnv(EnvBase):
         return after
 
     def _slot(
-        self, position: Tensor, velocity: Tensor
+        self, position: Tensor, control: Control
     ) -> tuple[TensorDictBase, SlotOutcome, Tasks | None]:
         """Fly one slot: what is observed, what the slot brought, and its tasks."""
         fading = self.draws.fading()
         tasks = self.draws.tasks() if self.draws_tasks else None
         links = None if fading is None else self.physics.link_row.unflatten(fading)
         nodes = self.physics.nodes._replace(helper=position)
-        outcome = slot(self.physics, nodes, Control(velocity, self._mode_rule), links, tasks)
+        outcome = slot(self.physics, nodes, control, links, tasks)
         observed = TensorDict(
             position=outcome.nodes.helper,
             mode=outcome.relays.to(torch.int64),

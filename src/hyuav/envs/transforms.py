@@ -54,9 +54,9 @@ def fenced(scenario: Scenario, position: Tensor, action: Tensor) -> Tensor:
 class Geofence(Transform):
     """Slow the flight, component by component, so that it ends on the map.
 
-    Changes ``action`` (..., H, 2) on its way to the environment, given ``position`` (..., H, 2) in
-    m. A helper that is sent beyond the edge flies to it or glides along it, where without the fence
-    it would be turned back and pay the penalty.
+    Changes the velocity in ``action`` (..., H, 2 or 3) on its way to the environment, given
+    ``position`` (..., H, 2) in m. A helper that is sent beyond the edge flies to it or glides along
+    it, where without the fence it would be turned back and pay the penalty.
 
     Args:
         scenario: its map, speed limit and slot duration.
@@ -68,7 +68,9 @@ class Geofence(Transform):
 
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Bound the action that the environment takes; the learner's own stays as it is."""
-        tensordict["action"] = fenced(self._scenario, tensordict["position"], tensordict["action"])
+        velocity, power = tensordict["action"].tensor_split([2], dim=-1)
+        velocity = fenced(self._scenario, tensordict["position"], velocity)
+        tensordict["action"] = torch.cat([velocity, power], dim=-1)
         return tensordict
 
 
@@ -90,8 +92,8 @@ def make_env(
     To the entries of the environment are added ``observation`` float32, the positions, modes and
     distances normalized to order one, as :class:`hyuav.envs.observation.ObservationLayout` has
     them; ``episode_reward`` (1,), the return so far in bps/Hz; and ``step_count`` (1,), the slots
-    flown. ``action`` (2 H,) steers all helpers. ``reward`` carries the off-map penalty, and after
-    T slots the episode is truncated; it never terminates.
+    flown. ``action`` (2 H,), with power control (3 H,), steers all helpers. ``reward`` carries the
+    off-map penalty, and after T slots the episode is truncated; it never terminates.
 
     Args:
         scenario: as for :class:`SecureOffloadingEnv`, like the following five.

@@ -191,13 +191,13 @@ def _per_slot(after: TensorDictBase) -> dict[str, Tensor]:
     diagnostics = after["diagnostics"]
     return {
         "secrecy_sum_rate": secrecy_sum_rate(after),
-        "relay_share": after["mode"].squeeze(-1),
+        "relay_share": after["mode"].float().mean(dim=-1),
         "offloading_share": diagnostics["offloading"].float().mean(dim=-1),
-        "off_map": after["off_map"].squeeze(-1),
+        "off_map": after["off_map"].sum(dim=-1),
         "budget_violations": diagnostics["budget_violation"].squeeze(-1),
         "ue_energy": diagnostics["ue_energy"].mean(dim=-1),
         "edge_energy": diagnostics["edge_energy"].squeeze(-1),
-        "helper_energy": diagnostics["helper_energy"].squeeze(-1),
+        "helper_energy": diagnostics["helper_energy"].sum(dim=-1),
     }
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.files import open_regular, read_regular, write_all, write_durably
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 
 METRIC_COLUMNS = (
     "episode",

@@ -11,7 +11,8 @@ from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import FlightPolicy, solve_optimum
+from hyuav.references.flight import FlightPolicy
+from hyuav.references.optimum import solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
 Policies = dict[str, list[TensorDictModuleBase]]

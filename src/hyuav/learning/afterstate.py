@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor, nn
 
+from hyuav._support.errors import InputError, rejection
 from hyuav.envs.observation import ObservationLayout
 from hyuav.envs.transforms import fenced
 from hyuav.physics.scenario import Scenario
@@ -18,19 +19,26 @@ class Afterstate(nn.Module):
     covered there changes the reward in steps a few metres apart, too narrow to be learned from
     distances; so coverage is shown as well, as a tanh of the distance to its edge.
 
-    Where the budget E_H bounds the speed, it is the hybrid scheme's bound that counts.
+    Where the budget E_H bounds the speed, it is the hybrid scheme's bound that counts. It is for
+    one helper at its nominal power.
 
     Args:
         scenario: its nodes, speed limit and map.
         coverage_blur: how wide the edge of the coverage is shown, as a share of the map's side.
         clock: whether the slots flown are observed.
         geofence: whether flights are slowed to end on the map.
+
+    Raises:
+        InputError: there are several helpers, or their power is controlled.
     """
 
     def __init__(
         self, scenario: Scenario, coverage_blur: float, *, clock: bool, geofence: bool
     ) -> None:
         super().__init__()
+        if scenario.num_helpers > 1 or scenario.power_control:
+            accepted = "false with several helpers or power control: it knows one helper's flight"
+            raise InputError(rejection("afterstate", True, accepted))
         self._blur = coverage_blur * scenario.map_side
         self._physics = Physics(scenario, torch.get_default_device())
         self._norm_limit = self._physics.norm_limit(["hybrid"])

@@ -122,7 +122,8 @@ class AlgorithmParameters(Parameters, ABC):
         """
         size, scale = self.observation_size(scenario), self.action_scale
         output = ScaledTanh(scale) if scale > 1.0 else nn.Tanh()
-        network = LearnerMLP(learners, size, self.hidden_sizes, 2, self.activation, output)
+        actions = ObservationLayout(scenario, clock=self.clock).action_size
+        network = LearnerMLP(learners, size, self.hidden_sizes, actions, self.activation, output)
         return TensorDictModule(network, in_keys=["observation"], out_keys=["action"])
 
     def make_critic(self, learners: int, scenario: Scenario) -> TensorDictModule:
@@ -133,7 +134,8 @@ class AlgorithmParameters(Parameters, ABC):
         """
         afterstate = self.make_afterstate(scenario, self.geofence) if self.afterstate else None
         if afterstate is None:
-            inputs, outputs = self.observation_size(scenario) + 2, 1
+            layout = ObservationLayout(scenario, clock=self.clock)
+            inputs, outputs = layout.size + layout.action_size, 1
         else:
             inputs, outputs = afterstate.size, 1 + afterstate.num_ues
         network = LearnerMLP(

@@ -21,7 +21,7 @@ from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
 from hyuav.learning.export import export
 from hyuav.learning.weights import load_weights, select_learners
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import Scenario
 
 Observed = TypeVar("Observed", Tensor, NDArray[Any], TensorDictBase)
@@ -60,7 +60,7 @@ def fly_noise_free(
         slot = env.step(algorithm.actor(state))
         control_term += algorithm.guide.control_term(slot).mean(dim=(1, 2))
         state = env.step_mdp(slot)
-        off_map += state["off_map"].squeeze(-1).float().mean(dim=-1)
+        off_map += state["off_map"].sum(dim=-1).float().mean(dim=-1)
         positions.append(layout.position(state["observation"])[:, 0])
     reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
     sum_rate = reward + scenario.off_map_penalty * off_map

@@ -12,6 +12,7 @@ from torchrl.modules import ProbabilisticActor, TanhNormal
 from torchrl.objectives import SoftUpdate
 
 from hyuav._support.parameters import Fraction, parameter
+from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.algorithm import (
     Algorithm,
     AlgorithmParameters,
@@ -28,16 +29,20 @@ Entropy = Annotated[float, Field(ge=-100.0, le=100.0)]
 
 @dataclass(frozen=True)
 class SAC(AlgorithmParameters):
-    """SAC's hyperparameters beside the common ones; the target entropy is minus dim(a)."""
+    """SAC's hyperparameters beside the common ones."""
 
     temperature_learning_rate: Fraction = parameter(3e-4)
     temperature_init: Temperature = parameter(0.2)
-    target_entropy: Entropy = parameter(-2.0)
+    target_entropy: Entropy | None = parameter(None)
+    """Minus the size of the action where it is None."""
 
     def build(self, learners: int, scenario: Scenario) -> Algorithm:
         """See :meth:`AlgorithmParameters.build`."""
         observation_size = self.observation_size(scenario)
-        network = LearnerMLP(learners, observation_size, self.hidden_sizes, 4, self.activation)
+        actions = ObservationLayout(scenario, clock=self.clock).action_size
+        network = LearnerMLP(
+            learners, observation_size, self.hidden_sizes, 2 * actions, self.activation
+        )
         distribution = TensorDictModule(
             nn.Sequential(network, NormalParamExtractor()),
             in_keys=["observation"],
@@ -58,7 +63,7 @@ class SAC(AlgorithmParameters):
             learners=learners,
             alpha_init=self.temperature_init,
             num_qvalue_nets=2,
-            target_entropy=self.target_entropy,
+            target_entropy=-actions if self.target_entropy is None else self.target_entropy,
             loss_function="l2",
             reduction="none",
             scalar_output_mode="exclude",

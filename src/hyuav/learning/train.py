@@ -46,7 +46,7 @@ from hyuav.learning.weights import (
     load_weights,
     replace_learners,
 )
-from hyuav.physics.offloading import ModeRuleName
+from hyuav.physics.modes import ModeRuleName
 from hyuav.physics.scenario import Scenario
 
 
@@ -126,10 +126,11 @@ class Cohort:
         self.stopped = torch.zeros(len(seeds), dtype=torch.int64, device=self.env.device)
 
     def _random_streams(self, seeds: Sequence[int], batch_size: int) -> dict[str, RowStream]:
+        actions = self.env.action_spec.shape[-1]
         laws = {
-            "exploration": (standard_normal, (self.algorithm.explorer_normals, 2)),
+            "exploration": (standard_normal, (self.algorithm.explorer_normals, actions)),
             "sampling": (uniform, (batch_size,)),
-            "losses": (standard_normal, (self.algorithm.loss_normals, batch_size, 2)),
+            "losses": (standard_normal, (self.algorithm.loss_normals, batch_size, actions)),
         }
         return {
             name: RowStream(law, shape, seeds, name, self.env.device)

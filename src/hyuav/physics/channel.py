@@ -6,6 +6,7 @@ All functions take tensors with any leading batch shape (written ``...``), in fl
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import NamedTuple, Self
 
 import torch
@@ -33,12 +34,25 @@ class Links(NamedTuple):
     """(..., H), g_{H,L}."""
     helper_eavesdropper: Tensor
     """(..., H, E), g_{H,E}."""
+    helper_helper: Tensor
+    """(..., H (H - 1) / 2), the same in both directions, in the order of :func:`pairs`."""
 
     def faded(self, fading: "Links | None") -> "Links":
         """These path gains times the fading powers; as they are where fading is off."""
         if fading is None:
             return self
         return Links(*(gain * power for gain, power in zip(self, fading, strict=True)))
+
+    def between_helpers(self, helper: int) -> Tensor:
+        """The numbers of one helper's links to all helpers, 0 for itself: (..., H, 1)."""
+        num_helpers = self.helper_legitimate.shape[-1]
+        own = torch.zeros_like(self.helper_legitimate[..., :1])
+        numbers = dict(zip(pairs(num_helpers), self.helper_helper.split(1, dim=-1), strict=True))
+        others = [
+            own if other == helper else numbers[min(helper, other), max(helper, other)]
+            for other in range(num_helpers)
+        ]
+        return torch.stack(others, dim=-2)
 
 
 @dataclass(frozen=True)
@@ -61,7 +75,8 @@ class LinkRow:
     def shapes(self) -> tuple[tuple[int, ...], ...]:
         """The shape of each entry of :class:`Links`, without leading axes."""
         ues, helpers, eavesdroppers = self.num_ues, self.num_helpers, self.num_eavesdroppers
-        return (ues,), (ues, helpers), (ues, eavesdroppers), (helpers,), (helpers, eavesdroppers)
+        from_ues = (ues,), (ues, helpers), (ues, eavesdroppers)
+        return (*from_ues, (helpers,), (helpers, eavesdroppers), (len(pairs(helpers)),))
 
     @cached_property
     def counts(self) -> tuple[int, ...]:
@@ -87,6 +102,11 @@ class LinkRow:
                 for part, shape in parts
             )
         )
+
+
+def pairs(num_helpers: int) -> list[tuple[int, int]]:
+    """All pairs of helpers (i, j) with i < j, counted from 0."""
+    return list(combinations(range(num_helpers), 2))
 
 
 def horizontal_distance(position: Tensor, other: Tensor) -> Tensor:
@@ -132,7 +152,7 @@ def ground_to_air(scenario: Scenario, distance: Tensor, height_difference: float
 
 
 def air_to_air(scenario: Scenario, distance: Tensor, height_difference: float) -> Tensor:
-    """Path gain of a helper's link to another UAV (eq. 4 without fading)."""
+    """Path gain of a helper's link to another UAV (eq. 4 without fading); as :func:`path_gain`."""
     return path_gain(distance, height_difference, scenario.air_to_air_gain)
 
 

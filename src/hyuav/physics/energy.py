@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor
 
+from hyuav.physics.modes import fixed_modes
 from hyuav.physics.scenario import Scenario
 
 
@@ -19,19 +20,18 @@ def offloading_energy(ue_power: float, slot_duration: float, num_ues: int, *, re
     return ue_power * slot_duration / ((2 if relay else 1) * num_ues)
 
 
-def relay_energy(offloading: Tensor, relay_power: Tensor | float, slot_duration: float) -> Tensor:
-    """Transmission energy in relay mode, sum_u z_u p_R Delta / (2 U) in J.
+def relay_energy(relayed_ues: Tensor, relay_power: Tensor | float, share: float) -> Tensor:
+    """Transmission energy of relays, p_i Delta / (2 U) in J for each UE that sends through one.
 
     Args:
-        offloading: (..., U) bool, z_u.
-        relay_power: p_R in W, (..., H) or of all.
-        slot_duration: Delta in s.
+        relayed_ues: (..., H), how many UEs send through each.
+        relay_power: p_i in W, (..., H) or of all.
+        share: Delta / U in s, the UE's share of the slot.
 
     Returns:
         (..., H) J.
     """
-    num_ues = offloading.shape[-1]
-    return offloading.sum(dim=-1, keepdim=True) * (relay_power * slot_duration / (2 * num_ues))
+    return relayed_ues * (relay_power * share / 2)
 
 
 def jamming_energy(jamming_power: Tensor | float, slot_duration: float) -> Tensor | float:
@@ -78,18 +78,29 @@ def speed_within_budget(energy: float, helper_mass: float, slot_duration: float)
     return float((max(energy, 0.0) / (0.5 * helper_mass * slot_duration)) ** 0.5)
 
 
-def budget_speed(scenario: Scenario, mode_rule: str) -> float:
-    """The speed in m/s at which flying and transmitting spend E_H in one slot (eq. 8g).
+def budget_speeds(scenario: Scenario, mode_rule: str) -> list[float]:
+    """The speeds in m/s at which flying and transmitting spend E_H in one slot (eq. 8g).
 
-    The mode is chosen after the move, so the dearer transmission open to ``mode_rule``, one of
-    :data:`hyuav.physics.offloading.MODE_RULES`, is set aside: jamming through the slot, or
-    relaying for every UE.
+    The mode is chosen after the move, so the dearer transmission open to the mode rule, as
+    :func:`hyuav.physics.modes.fixed_modes` reads it, is set aside: jamming through the slot,
+    or relaying for every UE.
+
+    Returns:
+        one for each helper.
     """
     relaying = scenario.relay_power * scenario.slot_duration / 2
     jamming = float(jamming_energy(scenario.jamming_power, scenario.slot_duration))
-    transmission = {"relay": relaying, "jamming": jamming, "hybrid": max(relaying, jamming)}
-    return speed_within_budget(
-        scenario.helper_energy_budget - transmission[mode_rule],
-        scenario.helper_mass,
-        scenario.slot_duration,
+    modes = fixed_modes(mode_rule, scenario.num_helpers)
+    transmissions = (
+        [max(relaying, jamming)] * scenario.num_helpers
+        if modes is None
+        else [relaying if relays else jamming for relays in modes]
     )
+    return [
+        speed_within_budget(
+            scenario.helper_energy_budget - transmission,
+            scenario.helper_mass,
+            scenario.slot_duration,
+        )
+        for transmission in transmissions
+    ]

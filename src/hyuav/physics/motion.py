@@ -7,7 +7,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from hyuav.physics.energy import budget_speed
+from hyuav.physics.energy import budget_speeds
 from hyuav.physics.scenario import Scenario
 
 
@@ -22,20 +22,23 @@ class Move(NamedTuple):
     """(...) bool, the flight would have left the map and ended where it began."""
 
 
-def norm_limits(scenario: Scenario, mode_rules: Sequence[str]) -> list[float] | None:
+def norm_limits(scenario: Scenario, mode_rules: Sequence[str]) -> list[list[float]] | None:
     """The bounds on the norm of the velocity in m/s, from the speed limit and the budget E_H.
 
     Args:
         scenario: that is flown.
-        mode_rules: each a name of :data:`hyuav.physics.offloading.MODE_RULES`.
+        mode_rules: as :func:`hyuav.physics.modes.fixed_modes` reads them.
 
     Returns:
-        one for each mode rule, or None where bounding each component by v_max suffices.
+        for each mode rule one for each helper, or None where bounding each component by v_max
+        suffices.
     """
     disc = scenario.speed_limit == "disc"
     reachable = scenario.max_speed * (1.0 if disc else math.sqrt(2.0))
-    limits = [min(budget_speed(scenario, rule), reachable) for rule in mode_rules]
-    if not disc and all(limit == reachable for limit in limits):
+    limits = [
+        [min(speed, reachable) for speed in budget_speeds(scenario, rule)] for rule in mode_rules
+    ]
+    if not disc and all(limit == reachable for own in limits for limit in own):
         return None
     return limits
 

@@ -1,6 +1,8 @@
 """Achievable rates of the two modes (the paper's rate table) and the secrecy sum-rate (eq. 6)."""
 
 import math
+from collections.abc import Sequence
+from functools import reduce
 from typing import NamedTuple
 
 import torch
@@ -35,44 +37,79 @@ def spectral_efficiency(snr: Tensor) -> Tensor:
     return torch.log1p(snr) * (1.0 / math.log(2.0))
 
 
-def relay_rates(
-    gains: Links, ue_power: float, relay_power: Tensor | float, noise_power: float
+class Sent(NamedTuple):
+    """What all nodes send at, in units of the noise power sigma^2."""
+
+    ue: float
+    """p_u / sigma^2."""
+    relay: Tensor
+    """p_i / sigma^2 of each helper where it relays: (..., H)."""
+    jamming: Tensor
+    """p_j / sigma^2 of each helper where it jams: (..., H)."""
+
+
+def straight_rates(
+    gains: Links, sent: Sent, jammers: Sequence[int], eavesdroppers: str
 ) -> AchievableRates:
-    """Rates in relay mode: decode-and-forward in two halves of the UE's share of the slot.
+    """Rates of UEs that send straight to the legitimate UAV, for their whole share of the slot.
+
+    The jammers' noise reaches the eavesdroppers and the legitimate UAV.
 
     Args:
-        gains: of the slot, with one helper and one eavesdropper.
-        ue_power: p_u in W.
-        relay_power: p_R in W, (..., H) or of all.
-        noise_power: sigma^2 in W.
+        gains: of the slot.
+        sent: by all nodes.
+        jammers: the helpers that jam, at least one, counted from 0.
+        eavesdroppers: as for :func:`overheard`.
     """
-    ue_snr, relay_snr = ue_power / noise_power, relay_power / noise_power
-    combined = relay_snr * gains.helper_legitimate + ue_snr * gains.ue_legitimate
-    decoded = ue_snr * gains.ue_helper.squeeze(-1)
-    heard_from_helper = relay_snr * gains.helper_eavesdropper.squeeze(-1)
-    overheard = heard_from_helper + ue_snr * gains.ue_eavesdropper.squeeze(-1)
-    return AchievableRates(torch.minimum(combined, decoded), overheard, 0.5)
-
-
-def jamming_rates(
-    gains: Links, ue_power: float, jamming_power: Tensor | float, noise_power: float
-) -> AchievableRates:
-    """Rates in jamming mode: the helper's noise reaches the eavesdropper and the legitimate UAV.
-
-    Args:
-        gains: of the slot, with one helper and one eavesdropper.
-        ue_power: p_u in W.
-        jamming_power: p_J in W, (..., H) or of all.
-        noise_power: sigma^2 in W.
-    """
-    ue_snr, jamming_snr = ue_power / noise_power, jamming_power / noise_power
-    at_legitimate = ue_snr / (jamming_snr * gains.helper_legitimate + 1.0)
-    at_eavesdropper = ue_snr / (jamming_snr * gains.helper_eavesdropper.squeeze(-1) + 1.0)
+    at_legitimate = sent.ue / _noise(sent, jammers, gains.helper_legitimate.unsqueeze(-1))
+    at_eavesdroppers = sent.ue / _noise(sent, jammers, gains.helper_eavesdropper).unsqueeze(-2)
     return AchievableRates(
         at_legitimate * gains.ue_legitimate,
-        at_eavesdropper * gains.ue_eavesdropper.squeeze(-1),
+        overheard(at_eavesdroppers * gains.ue_eavesdropper, eavesdroppers),
         1.0,
     )
+
+
+def relay_rates(
+    gains: Links, sent: Sent, relay: int, jammers: Sequence[int], eavesdroppers: str
+) -> AchievableRates:
+    """Rates through a relay: decode-and-forward in two halves of the UE's share of the slot.
+
+    Args:
+        gains: of the slot.
+        sent: by all nodes.
+        relay: the helper that relays, counted from 0.
+        jammers: the helpers that jam meanwhile.
+        eavesdroppers: as for :func:`overheard`.
+    """
+    own = sent.relay[..., relay : relay + 1]
+    to_legitimate = own * gains.helper_legitimate[..., relay : relay + 1]
+    to_eavesdroppers = own * gains.helper_eavesdropper[..., relay, :]
+    combined = to_legitimate + sent.ue * gains.ue_legitimate
+    decoded = sent.ue * gains.ue_helper[..., relay]
+    heard = to_eavesdroppers.unsqueeze(-2) + sent.ue * gains.ue_eavesdropper
+    if jammers:
+        combined = combined / _noise(sent, jammers, gains.helper_legitimate.unsqueeze(-1))
+        decoded = decoded / _noise(sent, jammers, gains.between_helpers(relay))
+        heard = heard / _noise(sent, jammers, gains.helper_eavesdropper).unsqueeze(-2)
+    return AchievableRates(torch.minimum(combined, decoded), overheard(heard, eavesdroppers), 0.5)
+
+
+def _noise(sent: Sent, jammers: Sequence[int], gains: Tensor) -> Tensor:
+    """Noise and jamming in units of sigma^2, from the helpers' gains (..., H, k): (..., k)."""
+    received = [sent.jamming[..., j : j + 1] * gains[..., j, :] for j in jammers]
+    return reduce(torch.add, received) + 1.0
+
+
+def overheard(snr: Tensor, eavesdroppers: str) -> Tensor:
+    """What the eavesdroppers make of what they receive: an SNR (..., U).
+
+    Args:
+        snr: of each of them, (..., U, E).
+        eavesdroppers: "independent", where the best-placed one counts, or "colluding", where their
+            SNRs add up.
+    """
+    return snr.sum(dim=-1) if eavesdroppers == "colluding" else snr.amax(dim=-1)
 
 
 def secrecy_rate(rates: AchievableRates) -> Tensor:

@@ -45,6 +45,9 @@ Power = Annotated[float, Field(ge=0.0, le=1e6)]
 Noise = Annotated[float, Field(ge=1e-24, le=1e6)]
 Gain = Annotated[float, Field(ge=0.0, le=1e6)]
 Decibel = Annotated[float, Field(ge=-100.0, le=100.0)]
+PowerRange = Annotated[
+    float, Field(gt=0.0, le=120.0, description="a number of decibels > 0, at most 120")
+]
 Exponent = Annotated[float, Field(ge=0.0, le=4.0)]
 """Up to 4, where float32 still holds the gains over the longest distances."""
 
@@ -73,11 +76,19 @@ def _as_several(value: Any) -> Any:
     return (value,) if pair else value
 
 
-OneNode = Annotated[
+LARGEST_NUMBER_OF_HELPERS = 6
+"""So many have 64 modes, each of which is tried in each slot."""
+
+Helpers = Annotated[
     tuple[Point, ...],
     BeforeValidator(_as_several),
-    Field(min_length=1, max_length=1, description="the position (x, y) of one node"),
+    Field(
+        min_length=1,
+        max_length=LARGEST_NUMBER_OF_HELPERS,
+        description=f"the positions (x, y) in metres of 1 to {LARGEST_NUMBER_OF_HELPERS} helpers",
+    ),
 ]
+Eavesdroppers = Annotated[Points, BeforeValidator(_as_several)]
 
 
 @dataclass(frozen=True)
@@ -100,8 +111,12 @@ class Scenario(Parameters):
 
     ue_positions: Points = parameter(symbol="(x_u, y_u)", unit="m")
     legitimate_position: Point = parameter((0.0, 0.0), symbol="(x_L, y_L)", unit="m")
-    eavesdropper_positions: OneNode = parameter(((80.0, 80.0),), symbol="(x_E, y_E)", unit="m")
-    helper_starts: OneNode = parameter(((-60.0, -60.0),), symbol="(x_H(0), y_H(0))", unit="m")
+    eavesdropper_positions: Eavesdroppers = parameter(
+        ((80.0, 80.0),), symbol="(x_E, y_E)", unit="m"
+    )
+    helper_starts: Helpers = parameter(((-60.0, -60.0),), symbol="(x_H(0), y_H(0))", unit="m")
+    eavesdroppers: Annotated[str, OneOf("independent", "colluding")] = parameter("independent")
+    """Whether the best-placed eavesdropper counts, or their SNRs add up."""
     num_slots: Slots = parameter(20, symbol="T")
     slot_duration: Positive = parameter(1.0, symbol="Delta", unit="s")
     map_side: Length = parameter(200.0, symbol="l_max", unit="m")
@@ -115,6 +130,10 @@ class Scenario(Parameters):
     ue_power: Power = parameter(0.1, symbol="p_u", unit="W")
     jamming_power: Power = parameter(0.08, symbol="p_J", unit="W")
     relay_power: Power = parameter(0.012, symbol="p_R", unit="W")
+    power_control: bool = parameter(False)
+    """Whether each helper's power is chosen in each slot, from the nominal one of its mode down."""
+    power_range: PowerRange = parameter(60.0, symbol="D", unit="dB")
+    """How far below the nominal power the least is."""
     noise_power: Noise = parameter(1e-13, symbol="sigma^2", unit="W")
     ground_to_air_gain: Gain = parameter(1e-5, symbol="beta_0")
     ground_to_air_exponent: Exponent = parameter(2.0, symbol="alpha")
@@ -165,6 +184,11 @@ class Scenario(Parameters):
     def num_eavesdroppers(self) -> int:
         """E, the number of eavesdroppers."""
         return len(self.eavesdropper_positions)
+
+    @property
+    def action_size(self) -> int:
+        """Numbers by which one helper is steered: its velocity, and its power where that is."""
+        return 3 if self.power_control else 2
 
     @classmethod
     def preset(cls, name: str) -> Self:

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from hyuav.physics import channel, energy, motion, offloading, rates
+from hyuav.physics import channel, energy, modes, motion, offloading, rates
 from hyuav.physics.channel import LinkRow, Links
 from hyuav.physics.layout import Nodes
-from hyuav.physics.offloading import ModeRule
+from hyuav.physics.modes import ModeRule
 from hyuav.physics.prospects import warn_of_what_cannot_earn
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.tasks import Tasks
@@ -20,21 +20,23 @@ class Control(NamedTuple):
 
     velocity: Tensor
     """(..., H, 2) m/s, within the limits that :meth:`Physics.velocity` keeps."""
-    mode_rule: ModeRule = ModeRule(may_relay=True, must_relay=False)
-    """Who chooses their modes; by default the better of both is taken."""
-    power: Tensor | float = 1.0
-    """(..., H), what they send at, in units of the nominal power of their mode."""
+    mode_rule: ModeRule = ModeRule()
+    """Which modes they may choose; by default any, and the best is taken."""
+    power: Tensor | None = None
+    """(..., H), what they send at, in units of the nominal power of their mode; None for 1."""
 
 
 class ModeOutcome(NamedTuple):
-    """What a slot brings in one mode of the helper."""
+    """What a slot brings in one mode of each helper."""
 
     sum_rate: Tensor
     """C_k, the secrecy sum-rate: (...) bps/Hz."""
     secrecy_rate: Tensor
-    """[R^d_u - R^e_u]^+: (..., U) bps/Hz."""
+    """[R^d_u - R^e_u]^+, the way that a UE takes: (..., U) bps/Hz."""
     offloading: Tensor
     """z_u: (..., U) bool."""
+    way: Tensor | int
+    """(..., U), or of all: the way that a UE takes, 0 straight to L and i through helper i."""
 
 
 class SlotOutcome(NamedTuple):
@@ -48,27 +50,54 @@ class SlotOutcome(NamedTuple):
     """(..., H) bool, the flight would have left the map and ended where it began."""
     distances: Tensor
     """(..., H, U + 1 + E) m, horizontal: from each helper to the UEs, L and the eavesdroppers."""
-    relays: Tensor
-    """(..., H) bool, which helpers relay; the others jam."""
-    relay: ModeOutcome
-    jamming: ModeOutcome
+    modes: tuple[ModeOutcome, ...]
+    """What each of the modes brings, in the order of :func:`hyuav.physics.modes.mode_vectors`."""
+    taken: tuple[Tensor, ...]
+    """(..., 1) bool for each mode but the first: whether it was taken, given those before it. The
+    last one that was taken is the chosen one."""
+    sum_rate: Tensor
+    """The secrecy sum-rate in the chosen modes: (..., 1) bps/Hz."""
 
     @property
-    def sum_rate(self) -> Tensor:
-        """The secrecy sum-rate in the chosen mode: (..., 1) bps/Hz."""
-        return torch.where(
-            self.relays, self.relay.sum_rate.unsqueeze(-1), self.jamming.sum_rate.unsqueeze(-1)
-        )
+    def relay(self) -> ModeOutcome:
+        """What it brings if all helpers relay."""
+        return self.modes[-1]
+
+    @property
+    def jamming(self) -> ModeOutcome:
+        """What it brings if all helpers jam."""
+        return self.modes[0]
+
+    @property
+    def relays(self) -> Tensor:
+        """(..., H) bool, which helpers relay; the others jam."""
+        vectors = modes.mode_vectors(self.control.velocity.shape[-2])
+        device = self.sum_rate.device
+        return self._chosen([torch.tensor(vector, device=device) for vector in vectors])
 
     @property
     def offloading(self) -> Tensor:
-        """z_u in the chosen mode: (..., U) bool."""
-        return torch.where(self.relays, self.relay.offloading, self.jamming.offloading)
+        """z_u in the chosen modes: (..., U) bool."""
+        return self._chosen([mode.offloading for mode in self.modes])
 
     @property
     def secrecy_rate(self) -> Tensor:
-        """[R^d_u - R^e_u]^+ in the chosen mode: (..., U) bps/Hz."""
-        return torch.where(self.relays, self.relay.secrecy_rate, self.jamming.secrecy_rate)
+        """[R^d_u - R^e_u]^+ in the chosen modes: (..., U) bps/Hz."""
+        return self._chosen([mode.secrecy_rate for mode in self.modes])
+
+    @property
+    def way(self) -> Tensor:
+        """The way that each UE takes if it offloads, as in :class:`ModeOutcome`: (..., U) int64."""
+        like = self.jamming.offloading
+        ways = (torch.as_tensor(mode.way, device=like.device) for mode in self.modes)
+        return self._chosen([way.expand_as(like) for way in ways])
+
+    def _chosen(self, values: Sequence[Tensor]) -> Tensor:
+        """Of values of each mode, those of the chosen one."""
+        chosen, *others = values
+        for taken, other in zip(self.taken, others, strict=True):
+            chosen = torch.where(taken, other, chosen)
+        return chosen
 
 
 class StandingNodes(NamedTuple):
@@ -82,8 +111,10 @@ class StandingNodes(NamedTuple):
     """Path gains of the UEs' links to L, (..., U)."""
     eavesdropper_gain: Tensor
     """And to the eavesdroppers, (..., U, E)."""
-    may_offload: Tensor
-    """(..., U) bool: whom L covers and who can pay for sending while the helper jams."""
+    covered: Tensor
+    """(..., U) bool: whom L covers."""
+    may_send: Tensor
+    """(..., U) bool: whom L covers and who can pay for sending straight to it."""
 
 
 class Geometry(NamedTuple):
@@ -127,6 +158,7 @@ class Physics:
         self.k_factor = self._k_factor()
         """Of all links, (link_row.size,), as power ratios."""
         self._pays_for_relaying = energy.ue_can_pay(scenario, relay=True)
+        self._sent = self._nominal()
         self.edge_can_saturate = energy.edge_can_saturate(scenario)
         """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
         self._standing = self._stand(self.nodes)
@@ -138,9 +170,19 @@ class Physics:
     def _k_factor(self) -> Tensor:
         ground = channel.k_factor_from_db(self.scenario.ground_to_air_k_factor)
         air = channel.k_factor_from_db(self.scenario.air_to_air_k_factor)
-        factors = zip((ground, ground, ground, air, air), self.link_row.shapes, strict=True)
+        of_links = (ground, ground, ground, air, air, air)
+        factors = zip(of_links, self.link_row.shapes, strict=True)
         links = Links(*(self._tensor(factor).expand(shape) for factor, shape in factors))
         return self.link_row.flatten(links)
+
+    def _nominal(self) -> rates.Sent:
+        scenario = self.scenario
+        helpers = torch.ones(scenario.num_helpers, dtype=self.dtype, device=self.device)
+        return rates.Sent(
+            scenario.ue_power / scenario.noise_power,
+            helpers * (scenario.relay_power / scenario.noise_power),
+            helpers * (scenario.jamming_power / scenario.noise_power),
+        )
 
     def _stand(self, nodes: Nodes) -> StandingNodes:
         scenario, ues = self.scenario, nodes.ue
@@ -149,7 +191,7 @@ class Physics:
         to_eavesdroppers = channel.horizontal_distance(
             ues.unsqueeze(-2), nodes.eavesdropper.unsqueeze(-3)
         )
-        covered = offloading.covered_by_legitimate(to_legitimate, scenario.coverage_radius)
+        covered = offloading.covered(to_legitimate, scenario.coverage_radius)
         groups = ues, legitimate, nodes.eavesdropper
         leading = torch.broadcast_shapes(*(group.shape[:-2] for group in groups))
         positions = [group.expand(*leading, *group.shape[-2:]) for group in groups]
@@ -158,6 +200,7 @@ class Physics:
             to_legitimate,
             channel.ground_to_air(scenario, to_legitimate, scenario.altitude),
             channel.ground_to_air(scenario, to_eavesdroppers, scenario.eavesdropper_altitude),
+            covered,
             covered & energy.ue_can_pay(scenario, relay=False),
         )
 
@@ -194,13 +237,22 @@ class Physics:
             standing.eavesdropper_gain,
             channel.air_to_air(scenario, to_legitimate.squeeze(-1), 0.0),
             channel.air_to_air(scenario, to_eavesdroppers, climb),
+            self._between_helpers(nodes.helper),
         )
         return Geometry(distances, ue_to_helper, standing, gains)
 
+    def _between_helpers(self, helper: Tensor) -> Tensor:
+        """Path gains of the links between helpers (..., H, 2) m, at equal altitude."""
+        if self.scenario.num_helpers == 1:
+            return helper[..., :0, 0]
+        first, second = zip(*channel.pairs(self.scenario.num_helpers), strict=True)
+        distance = channel.horizontal_distance(helper[..., first, :], helper[..., second, :])
+        return channel.air_to_air(self.scenario, distance, 0.0)
+
     def norm_limit(self, mode_rules: Sequence[str]) -> Tensor | None:
-        """The bounds that :func:`hyuav.physics.motion.norm_limits` gives: (len(mode_rules), 1)."""
+        """The bounds that :func:`hyuav.physics.motion.norm_limits` gives: (len(mode_rules), H)."""
         limits = motion.norm_limits(self.scenario, mode_rules)
-        return None if limits is None else self._tensor(limits).unsqueeze(-1)
+        return None if limits is None else self._tensor(limits)
 
     def velocity(self, action: Tensor, norm_limit: Tensor | None) -> Tensor:
         """The velocity (..., 2) m/s of an action (..., 2) in units of v_max, within the limits.
@@ -208,6 +260,22 @@ class Physics:
         ``norm_limit`` is what :meth:`norm_limit` gives, broadcast against the actions.
         """
         return motion.feasible_velocity(action, self.scenario.max_speed, norm_limit)
+
+    def control(self, action: Tensor, norm_limit: Tensor | None, mode_rule: ModeRule) -> Control:
+        """What helpers do that are steered by actions.
+
+        Args:
+            action: (..., H, 2) in [-1, 1], the velocity in units of v_max; where powers are
+                controlled (..., H, 3): the last number a is for the nominal power times
+                10^(-(D / 10) (1 - a) / 2), with D = ``power_range`` in dB.
+            norm_limit: as for :meth:`velocity`.
+            mode_rule: which modes may be chosen.
+        """
+        scenario, power = self.scenario, None
+        if scenario.power_control:
+            below = (1.0 - action[..., 2].clamp(-1.0, 1.0)) * (scenario.power_range / 20.0)
+            action, power = action[..., :2], torch.pow(10.0, -below)
+        return Control(self.velocity(action, norm_limit), mode_rule, power)
 
     def move(self, position: Tensor, velocity: Tensor) -> motion.Move:
         """Fly one slot from ``position`` (..., 2) m at ``velocity`` (..., 2) m/s."""
@@ -223,51 +291,48 @@ class Physics:
             return None
         return channel.rician_power(self.k_factor, (*shape, self.link_row.size), generator)
 
-    def relay_outcome(
+    def outcomes(
         self,
         geometry: Geometry,
         gains: Links,
         tasks: Tasks | None,
-        power: Tensor | float = 1.0,
-    ) -> ModeOutcome:
-        """The slot in relay mode.
+        power: Tensor | None = None,
+        vectors: Sequence[Sequence[bool]] | None = None,
+    ) -> tuple[ModeOutcome, ...]:
+        """The slot in each of the helpers' modes.
 
         Args:
             geometry: of the slot's nodes.
             gains: with fading.
             tasks: needed where :attr:`edge_can_saturate`, and used nowhere else.
             power: as in :class:`Control`.
-        """
-        scenario = self.scenario
-        achievable = rates.relay_rates(
-            gains, scenario.ue_power, scenario.relay_power * power, scenario.noise_power
-        )
-        covered = offloading.covered_by_relay(
-            geometry.ue_to_helper.squeeze(-1),
-            geometry.standing.ue_to_legitimate,
-            scenario.coverage_radius,
-        )
-        return self._outcome(achievable, covered & self._pays_for_relaying, tasks)
+            vectors: the modes that are asked for; all by default.
 
-    def jamming_outcome(
+        Returns:
+            one for each of them, in the order of :func:`hyuav.physics.modes.mode_vectors`.
+        """
+        sent = self._sent
+        if power is not None:
+            sent = rates.Sent(sent.ue, sent.relay * power, sent.jamming * power)
+        asked = modes.mode_vectors(self.scenario.num_helpers) if vectors is None else vectors
+        return tuple(self._outcome(geometry, gains, sent, relays, tasks) for relays in asked)
+
+    def _outcome(
         self,
         geometry: Geometry,
         gains: Links,
+        sent: rates.Sent,
+        relays: Sequence[bool],
         tasks: Tasks | None,
-        power: Tensor | float = 1.0,
     ) -> ModeOutcome:
-        """The slot in jamming mode; as :meth:`relay_outcome`."""
+        """The slot in given modes of the helpers; each UE takes its own best way (eq. 5 and 11)."""
         scenario = self.scenario
-        achievable = rates.jamming_rates(
-            gains, scenario.ue_power, scenario.jamming_power * power, scenario.noise_power
-        )
-        return self._outcome(achievable, geometry.standing.may_offload, tasks)
-
-    def _outcome(
-        self, achievable: rates.AchievableRates, allowed: Tensor, tasks: Tasks | None
-    ) -> ModeOutcome:
-        scenario = self.scenario
-        rate = rates.secrecy_rate(achievable)
+        ways = self._ways(geometry, gains, sent, relays)
+        way, rate, allowed = ways[0]
+        for number, other_rate, other_allowed in ways[1:]:
+            better = other_allowed & ((other_rate > rate) | ~allowed)
+            way = torch.where(better, number, way)
+            rate, allowed = torch.where(better, other_rate, rate), allowed | other_allowed
         decision = offloading.offloading_decision(rate, allowed, scenario.min_secrecy_rate)
         if self.edge_can_saturate:
             if tasks is None:
@@ -280,7 +345,26 @@ class Physics:
                 scenario.slot_duration,
                 scenario.edge_energy_budget,
             )
-        return ModeOutcome(rates.secrecy_sum_rate(rate, decision), rate, decision)
+        return ModeOutcome(rates.secrecy_sum_rate(rate, decision), rate, decision, way)
+
+    def _ways(
+        self, geometry: Geometry, gains: Links, sent: rates.Sent, relays: Sequence[bool]
+    ) -> list[tuple[int, Tensor, Tensor]]:
+        """How UEs may send to L: the way's number, the secrecy rates, and which UEs may take it."""
+        kind = self.scenario.eavesdroppers
+        jammers = [helper for helper, relaying in enumerate(relays) if not relaying]
+        ways = []
+        if jammers:
+            straight = rates.straight_rates(gains, sent, jammers, kind)
+            ways.append((0, rates.secrecy_rate(straight), geometry.standing.may_send))
+        for helper, relaying in enumerate(relays):
+            if relaying:
+                through = rates.relay_rates(gains, sent, helper, jammers, kind)
+                distance = geometry.ue_to_helper[..., helper]
+                near = offloading.covered(distance, self.scenario.coverage_radius)
+                allowed = near & geometry.standing.covered & self._pays_for_relaying
+                ways.append((helper + 1, rates.secrecy_rate(through), allowed))
+        return ways
 
 
 def slot(
@@ -292,8 +376,8 @@ def slot(
 ) -> SlotOutcome:
     """One slot of any batch of flights: lines 6 to 11 of Algorithm 1.
 
-    The helpers fly, then the channel is known: who offloads, and what it brings, in both modes
-    (eq. 3 to 6, 8c to 8f and 11), and the mode that is chosen.
+    The helpers fly, then the channel is known: who offloads which way, and what it brings, in all
+    modes (eq. 3 to 6, 8c to 8f and 11), and the modes that are chosen.
 
     Args:
         physics: the scenario's constants.
@@ -315,7 +399,12 @@ def slot(
     nodes = nodes._replace(helper=moved.position)
     geometry = physics.geometry(nodes)
     gains = geometry.gains.faded(fading)
-    relay = physics.relay_outcome(geometry, gains, tasks, control.power)
-    jamming = physics.jamming_outcome(geometry, gains, tasks, control.power)
-    relays = offloading.chooses_relay(relay.sum_rate, jamming.sum_rate, control.mode_rule)
-    return SlotOutcome(nodes, control, moved.off_map, geometry.distances, relays, relay, jamming)
+    outcomes = physics.outcomes(geometry, gains, tasks, control.power)
+    taken = []
+    best = outcomes[0].sum_rate.unsqueeze(-1)
+    for number, outcome in enumerate(outcomes[1:], start=1):
+        sum_rate = outcome.sum_rate.unsqueeze(-1)
+        taken.append(modes.beats(sum_rate, best, control.mode_rule, number))
+        best = torch.where(taken[-1], sum_rate, best)
+    distances = geometry.distances
+    return SlotOutcome(nodes, control, moved.off_map, distances, outcomes, tuple(taken), best)

@@ -1,5 +1,7 @@
 """Backward dynamic programming over a grid of helper positions."""
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +11,7 @@ from scipy.ndimage import maximum_filter
 from torch import Tensor
 
 from hyuav.physics.scenario import Scenario
+from hyuav.physics.slot import Physics
 
 Values = NDArray[np.float64]
 
@@ -31,28 +34,54 @@ class Grid(NamedTuple):
         """(X, Y)."""
         return len(self.x), len(self.y)
 
+    def places(self, points: NDArray[np.int64]) -> Tensor:
+        """Where rows and columns (..., 2) of the grid are: (..., 2) m."""
+        rows, columns = points[..., 0], points[..., 1]
+        return torch.from_numpy(np.stack([self.x[rows], self.y[columns]], axis=-1))
+
     def positions(self) -> Tensor:
         """All grid points, row by row: (X * Y, 2) m."""
         axes = torch.from_numpy(self.x), torch.from_numpy(self.y)
         return torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1).reshape(-1, 2)
 
 
-def grid_over_map(scenario: Scenario, resolution: float) -> Grid:
-    """The grid anchored at the helper's start.
+def grid_over_map(scenario: Scenario, resolution: float, helper: int = 0) -> Grid:
+    """The grid anchored at a helper's start.
 
     Args:
         scenario: gives the start and the map's side.
         resolution: spacing in m.
+        helper: which one's, counted from 0.
     """
     half = scenario.map_side / 2
     axes, origin = [], []
-    for coordinate in scenario.helper_starts[0]:
+    for coordinate in scenario.helper_starts[helper]:
         before = int((half + coordinate) / resolution * (1 + ROUNDING))
         after = int((half - coordinate) / resolution * (1 + ROUNDING))
         axis = coordinate + resolution * np.arange(-before, after + 1)
         axes.append(axis.clip(-half, half))
         origin.append(before)
     return Grid(axes[0], axes[1], (origin[0], origin[1]))
+
+
+def reaches_of(
+    physics: Physics, mode_rule: str, spacing: float, more: float = 0.0
+) -> list["Reach"]:
+    """What each helper reaches in a slot on a grid.
+
+    Args:
+        physics: of the scenario.
+        mode_rule: whose transmission energy counts against E_H.
+        spacing: of the grid in m.
+        more: how many spacings farther along each axis.
+    """
+    scenario = physics.scenario
+    spacings = scenario.slot_duration / spacing
+    limits = physics.norm_limit([mode_rule])
+    norms = [math.inf] * scenario.num_helpers if limits is None else limits[0].tolist()
+    across = scenario.map_side / spacing + 1
+    box = min(scenario.max_speed * spacings + more, across)
+    return [Reach(box, norm * spacings + more * math.sqrt(2.0)) for norm in norms]
 
 
 class Reach:
@@ -77,15 +106,32 @@ class Reach:
         self._squared_norm = offsets[:, None] ** 2 + offsets**2
         self._reachable = np.abs(offsets) <= columns[np.abs(offsets)][:, None]
 
-    def best(self, values: Values) -> Values:
-        """The largest value within reach of each grid point: (X, Y)."""
+    def best(self, values: Values, helper: int = 0) -> Values:
+        """The largest value within a helper's reach of each grid point.
+
+        Args:
+            values: (X, Y), or those of all pairs, ... of helpers' grid points, (X, Y, X', Y', ...).
+            helper: which of them flies.
+        """
         best = np.full_like(values, -np.inf)
+        own = slice(2 * helper, 2 * helper + 2)
         for half_widths in self.boxes:
+            size = [1] * values.ndim
             # A window cannot reach further than across the grid.
-            size = [2 * min(h, n - 1) + 1 for h, n in zip(half_widths, values.shape, strict=True)]
+            widths = zip(half_widths, values.shape[own], strict=True)
+            size[own] = [2 * min(h, n - 1) + 1 for h, n in widths]
             # Repeating the edge adds no value that the cut window does not hold already.
             np.maximum(best, maximum_filter(values, size, mode="nearest"), out=best)
         return best
+
+    def within(self, grid: Grid, point: tuple[int, int]) -> NDArray[np.bool_]:
+        """Which grid points (X, Y) are within reach of one."""
+        span = self._reachable.shape[0] // 2
+        rows = np.arange(grid.shape[0]) - point[0]
+        columns = np.arange(grid.shape[1]) - point[1]
+        near = (np.abs(rows) <= span)[:, None] & (np.abs(columns) <= span)
+        row, column = (np.clip(offsets, -span, span) + span for offsets in (rows, columns))
+        return near & self._reachable[row[:, None], column]
 
     def argbest(self, values: Values, point: tuple[int, int]) -> tuple[int, int]:
         """The grid point with the largest value within reach of ``point``; of equals the nearest.
@@ -110,40 +156,37 @@ class Reach:
         return int(row) + low[0], int(column) + low[1]
 
 
-def values_to_go(reward: Values, reach: Reach, num_slots: int) -> list[Values]:
-    """V with 0, 1, ..., T - 1 slots to go, for every grid point.
+def values_to_go(rewards: Sequence[Values], reach: Reach) -> list[Values]:
+    """What can still be earned after each slot, from every grid point.
 
-    V_n(x) = max over x' within reach of x of [reward(x') + V_{n-1}(x')] and V_0 = 0: the reward
-    has no clock, so the values of all horizons come out of one pass.
+    V_t(x) = max over x' within reach of x of [reward_{t+1}(x') + V_{t+1}(x')] and V_T = 0.
 
     Args:
-        reward: expected reward of a slot spent at each grid point, (X, Y) bps/Hz.
+        rewards: of the T slots, expected at each grid point, (X, Y) bps/Hz; -infinity for one
+            where the helper may not be.
         reach: of one slot.
-        num_slots: T.
 
     Returns:
         T arrays (X, Y) in bps/Hz.
     """
-    values = [np.zeros_like(reward)]
-    for _ in range(num_slots - 1):
+    values = [np.zeros_like(rewards[-1])]
+    for reward in reversed(rewards[1:]):
         values.append(reach.best(reward + values[-1]))
-    return values
+    return values[::-1]
 
 
 def best_flight(
-    reward: Values, values: list[Values], reach: Reach, grid: Grid, num_slots: int
-) -> Tensor:
-    """The best flight of ``num_slots`` slots from the start: (num_slots + 1, 1, 2) m, float64.
+    rewards: Sequence[Values], values: Sequence[Values], reach: Reach, start: tuple[int, int]
+) -> NDArray[np.int64]:
+    """The best flight from a grid point: rows and columns of the grid, (T + 1, 2).
 
     Args:
-        reward: (X, Y) bps/Hz.
-        values: what :func:`values_to_go` gives, for at least ``num_slots`` slots.
+        rewards: of the T slots, (X, Y) bps/Hz.
+        values: what :func:`values_to_go` gives for them.
         reach: of one slot.
-        grid: of the positions.
-        num_slots: T, or any shorter horizon.
+        start: row and column.
     """
-    flight = [grid.start]
-    for value in reversed(values[:num_slots]):
+    flight = [start]
+    for reward, value in zip(rewards, values, strict=True):
         flight.append(reach.argbest(reward + value, flight[-1]))
-    rows, columns = np.array(flight).T
-    return torch.from_numpy(np.stack([grid.x[rows], grid.y[columns]], axis=-1)).unsqueeze(-2)
+    return np.array(flight)

@@ -1,13 +1,15 @@
 """The best possible flight under each mode rule, by dynamic programming over the helper's position.
 
 Given the position, fading and tasks are independent from slot to slot and unknown when the
-action is taken. The best expected return is therefore a deterministic dynamic program over the
-position alone,
+action is taken. The best expected return of one helper is therefore a deterministic dynamic
+program over the position alone,
 
     V_t(x) = max over x' within reach of x of [ E r(x') + V_{t+1}(x') ],
 
 with the reward r = max(C_1, C_0) for the hybrid helper, C_1 for relay only and C_0 for jamming
-only. Positions are taken from a grid, which makes V a lower bound to the continuous optimum.
+only; where the power is controlled, with the best power at x'. Positions are taken from a grid,
+which makes V a lower bound to the continuous optimum. For several helpers see
+:mod:`hyuav.references.joint`, and for what no flight exceeds :mod:`hyuav.references.bounds`.
 """
 
 import dataclasses
@@ -17,20 +19,28 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import torch
-import torch.nn.functional as F  # noqa: N812
 from pydantic import Field
-from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection
 from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked
 from hyuav.envs.arguments import ScenarioLike, as_scenario, as_seed
-from hyuav.physics.offloading import MODE_RULES, ModeRuleName
+from hyuav.physics.modes import MODE_RULES, fixed_modes
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
-from hyuav.references.grid import Grid, Reach, best_flight, grid_over_map, values_to_go
-from hyuav.references.rewards import estimate_return, reward_maps
+from hyuav.references.bounds import CellBounds
+from hyuav.references.flight import flyable
+from hyuav.references.grid import (
+    Reach,
+    Values,
+    best_flight,
+    grid_over_map,
+    reaches_of,
+    values_to_go,
+)
+from hyuav.references.joint import SeveralHelpers
+from hyuav.references.power import best_levels
+from hyuav.references.rewards import ExpectedReward, estimate_return
 
 RESOLUTION = 1.0
 """Default grid spacing in metres: halving it moves no preset's value by 0.2 %."""
@@ -40,6 +50,10 @@ MEMORY_LIMIT = 4 * 2**30
 
 
 _Draws = Annotated[int, Field(ge=2, le=LARGEST_COUNT)]
+_ModeRule = Annotated[
+    str, Field(description=f"{', '.join(MODE_RULES)}, or a letter r or j for each helper")
+]
+PowerStep = Annotated[float, Field(ge=0.01, le=120.0)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,43 +75,11 @@ class Optimum:
     modes: Tensor
     """(T, H) int64: 1 relay, 0 jamming. Of the hybrid, relay where expected C_1 exceeds C_0."""
     power: Tensor
-    """(T, H) W, float64: the nominal power of the mode."""
+    """(T, H) W, float64: what the helpers send at in these modes."""
+    share: Tensor
+    """(T, H): the same in units of the nominal power."""
     upper_bound: float | None = None
     """Of what any flight earns, in bps/Hz; None where none is computed."""
-
-
-class FlightPolicy(TensorDictModuleBase):
-    """Fly a given path in an environment made by :func:`hyuav.make_env`.
-
-    Reads ``position`` (..., H, 2) m and ``step_count`` (..., 1), writes ``action`` (..., 2 H): the
-    velocities, in units of v_max, that lead to the path's next positions. The helpers stay at the
-    last ones when the path is flown.
-
-    Args:
-        path: (T + 1, H, 2) m, such as :attr:`Optimum.path`.
-        scenario: whose speed and slot duration the environment has.
-
-    Example:
-        >>> optimum = solve_optimum("two_clusters", ["hybrid"])["hybrid"]
-        >>> env = make_env(optimum.scenario, "hybrid", batch_size=(100,))
-        >>> env.rollout(20, FlightPolicy(optimum.path, optimum.scenario))
-    """
-
-    in_keys = ("position", "step_count")
-    out_keys = ("action",)
-
-    def __init__(self, path: Tensor, scenario: Scenario) -> None:
-        super().__init__()
-        self.register_buffer("path", path.to(torch.float64))
-        self.step_length = scenario.max_speed * scenario.slot_duration
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the action of each helper in the batch."""
-        path = self.get_buffer("path")
-        slot = (tensordict["step_count"].squeeze(-1) + 1).clamp(max=len(path) - 1)
-        position = tensordict["position"]
-        action = ((path[slot] - position) / self.step_length).flatten(-2)
-        return tensordict.set("action", action.clamp(-1.0, 1.0).to(position.dtype))
 
 
 def solve_optimum(
@@ -105,21 +87,27 @@ def solve_optimum(
     mode_rules: Sequence[str] = MODE_RULES,
     *,
     resolution: float = RESOLUTION,
+    power_step: float = 1.0,
     draws: int = 256,
     evaluation_draws: int = 10_000,
     seed: int = 0,
+    certify: bool = False,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
 ) -> dict[str, Optimum]:
     """The best flight under each mode rule over the scenario's T slots.
 
     Args:
         scenario: node positions and parameters, or the name of a preset.
-        mode_rules: who may choose the modes, of :data:`hyuav.physics.offloading.MODE_RULES`.
-        resolution: spacing of the grid in m; the helper's start is a grid point.
+        mode_rules: who may choose the modes: of :data:`hyuav.physics.modes.MODE_RULES`, or a
+            letter r or j for each helper.
+        resolution: spacing of the grid in m; the helpers' starts are grid points.
+        power_step: between the levels of power that are tried, in dB, where it is controlled.
         draws: of a slot's fading and tasks that the expected reward is averaged over, the same
             at all positions. They choose the flight and nothing else.
         evaluation_draws: of whole episodes, from which the flight's value is estimated.
         seed: of all draws; not used where no slot is random.
+        certify: give the upper bound too, which takes some seconds; always given for several
+            helpers.
         track: passes on the mode rules one by one, as what shows the progress does.
 
     Returns:
@@ -136,9 +124,11 @@ def solve_optimum(
         (scenario.num_slots,),
         mode_rules,
         resolution=resolution,
+        power_step=power_step,
         draws=draws,
         evaluation_draws=evaluation_draws,
         seed=seed,
+        certify=certify,
         track=track,
     )
     return {mode_rule: optima[scenario.num_slots] for mode_rule, optima in found.items()}
@@ -150,9 +140,11 @@ def solve_horizons(
     mode_rules: Sequence[str] = MODE_RULES,
     *,
     resolution: float = RESOLUTION,
+    power_step: float = 1.0,
     draws: int = 256,
     evaluation_draws: int = 10_000,
     seed: int = 0,
+    certify: bool = False,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
 ) -> dict[str, dict[int, Optimum]]:
     """The best flight under each mode rule over each horizon, from one backward pass.
@@ -163,9 +155,11 @@ def solve_horizons(
         horizons: numbers of slots T, each at least 1.
         mode_rules: who may choose the modes.
         resolution: spacing of the grid in m.
+        power_step: between the levels of power in dB.
         draws: that the expected reward is averaged over.
         evaluation_draws: from which each flight's value is estimated.
         seed: of all draws.
+        certify: give upper bounds too.
         track: passes on the mode rules.
 
     Returns:
@@ -175,7 +169,10 @@ def solve_horizons(
         InputError: as :func:`solve_optimum`, and for horizons that are none or below 1.
     """
     scenario = as_scenario(scenario)
-    mode_rules = checked(OneOrMore[ModeRuleName], "mode_rules", mode_rules)
+    mode_rules = checked(OneOrMore[_ModeRule], "mode_rules", mode_rules)
+    for mode_rule in mode_rules:
+        fixed_modes(mode_rule, scenario.num_helpers, "mode_rules")
+    checked(PowerStep, "power_step", power_step)
     scenarios = _with_horizons(scenario, horizons)
     longest = max(scenarios)
     draws = checked(_Draws, "draws", draws)
@@ -185,23 +182,35 @@ def solve_horizons(
     map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root).tolist()
 
     physics = Physics(scenario, dtype=torch.float64)
-    grid = grid_over_map(scenario, resolution)
-    maps = reward_maps(physics, grid.positions(), draws, torch.Generator().manual_seed(map_seed))
+    one = scenario.num_helpers == 1
+    planner: _OneHelper | SeveralHelpers = (
+        _OneHelper(physics, mode_rules, longest, resolution, power_step, draws, map_seed)
+        if one
+        else SeveralHelpers(physics, resolution, power_step, draws, map_seed)
+    )
+    bounds = CellBounds(physics, map_seed) if certify or not one else None
     optima: dict[str, dict[int, Optimum]] = {}
     for mode_rule in track(mode_rules):
-        reward = maps[MODE_RULES.index(mode_rule)].reshape(grid.shape).numpy()
-        reach = _reach(physics, mode_rule, grid, resolution)
-        values = values_to_go(reward, reach, longest)
         optima[mode_rule] = {}
         for horizon, shorter in scenarios.items():
-            path = _flyable(best_flight(reward, values, reach, grid, horizon), physics, mode_rule)
+            path, share = planner.best(mode_rule, horizon)
+            path = flyable(path, physics, mode_rule)
             # The same episodes for every flight, so that differences between them stand out.
             generator = torch.Generator().manual_seed(evaluation_seed)
             value, error, modes = estimate_return(
-                physics, path, mode_rule, evaluation_draws, generator
+                physics, path, mode_rule, evaluation_draws, generator, share
             )
             optima[mode_rule][horizon] = Optimum(
-                shorter, mode_rule, resolution, value, error, path, modes, _power(scenario, modes)
+                shorter,
+                mode_rule,
+                resolution,
+                value,
+                error,
+                path,
+                modes,
+                _nominal(scenario, modes) * share,
+                share,
+                None if bounds is None else bounds.of(mode_rule, horizon),
             )
     return optima
 
@@ -229,42 +238,52 @@ def require_resolution(resolution: float, map_side: float, num_slots: int) -> No
         raise InputError(rejection("resolution", resolution, reason))
 
 
-def _reach(physics: Physics, mode_rule: str, grid: Grid, resolution: float) -> Reach:
-    scenario = physics.scenario
-    spacings = scenario.slot_duration / resolution
-    norm_limit = physics.norm_limit([mode_rule])
-    disc = math.inf if norm_limit is None else float(norm_limit) * spacings
-    return Reach(min(scenario.max_speed * spacings, max(grid.shape)), disc)
+class _OneHelper:
+    """The best flights of one helper on a grid, under every mode rule and over every horizon.
 
-
-def _flyable(path: Tensor, physics: Physics, mode_rule: str) -> Tensor:
-    """Draw a path (T + 1, H, 2) m back from the edges that float32 would put it beyond.
-
-    The best positions often lie exactly on the edge of a UE's coverage or of the map, and an
-    environment in float32 may miss the edge by a few units in the last place: the reward of a
-    slot would be lost. Such positions are moved by some 0.1 mm (on a map of 200 m), towards the
-    UEs on whose edge of coverage they lie and towards the inside of the map.
+    Args:
+        physics: in float64.
+        mode_rules: that are asked for.
+        num_slots: the longest horizon.
+        resolution: spacing of the grid in m.
+        power_step: between the levels of power in dB.
+        draws: of a slot's fading and tasks that the expected reward is averaged over.
+        seed: of the draws.
     """
-    scenario = physics.scenario
-    shift = 4 * torch.finfo(torch.float32).eps * scenario.map_side
-    to_ues = physics.nodes.ue - path.unsqueeze(-2)
-    distance = torch.linalg.vector_norm(to_ues, dim=-1)
-    on_edge = (distance - scenario.coverage_radius).abs() < shift / 2
-    inwards = (F.normalize(to_ues, dim=-1) * on_edge.unsqueeze(-1)).sum(dim=-2)
-    inside = scenario.map_side / 2 - shift
-    targets = (path + shift * F.normalize(inwards, dim=-1)).clamp(-inside, inside)
-    # A shifted position may lie just out of reach of the one before: fly there as the helper can.
-    norm_limit = physics.norm_limit([mode_rule])
-    norm_limit = None if norm_limit is None else norm_limit[0]
-    step_length = scenario.max_speed * scenario.slot_duration
-    flown = [path[0]]
-    for target in targets[1:]:
-        action = (target - flown[-1]) / step_length
-        velocity = physics.velocity(action, norm_limit)
-        flown.append(physics.move(flown[-1], velocity).position)
-    return torch.stack(flown)
+
+    def __init__(
+        self,
+        physics: Physics,
+        mode_rules: Sequence[str],
+        num_slots: int,
+        resolution: float,
+        power_step: float,
+        draws: int,
+        seed: int,
+    ) -> None:
+        expected = ExpectedReward(physics, draws, torch.Generator().manual_seed(seed))
+        quiet = ExpectedReward(physics, 1, torch.Generator().manual_seed(seed))
+        self._grid = grid_over_map(physics.scenario, resolution)
+        places = self._grid.positions().unsqueeze(1)
+        nominal = torch.ones(len(places), 1, dtype=places.dtype)
+        rewards, shares = best_levels(expected, quiet, mode_rules, places, nominal, 0, power_step)
+        self._maps: dict[str, tuple[list[Values], list[Values], Reach, Tensor]] = {}
+        for mode_rule, reward, share in zip(mode_rules, rewards, shares, strict=True):
+            of_slots = [reward.reshape(self._grid.shape).numpy()] * num_slots
+            (reach,) = reaches_of(physics, mode_rule, resolution)
+            values = values_to_go(of_slots, reach)
+            self._maps[mode_rule] = of_slots, values, reach, share.reshape(self._grid.shape)
+
+    def best(self, mode_rule: str, num_slots: int) -> tuple[Tensor, Tensor]:
+        """A path (T + 1, 1, 2) m and powers (T, 1), in units of the nominal power."""
+        rewards, values, reach, share = self._maps[mode_rule]
+        # The reward has no clock, so the values of all horizons are those of the longest's end.
+        grid, last = self._grid, slice(len(values) - num_slots, None)
+        flight = best_flight(rewards[last], values[last], reach, grid.start)
+        rows, columns = flight[1:].T
+        return grid.places(flight).unsqueeze(1), share[rows, columns].unsqueeze(1)
 
 
-def _power(scenario: Scenario, modes: Tensor) -> Tensor:
+def _nominal(scenario: Scenario, modes: Tensor) -> Tensor:
     powers = torch.tensor([scenario.jamming_power, scenario.relay_power], dtype=torch.float64)
     return powers[modes]

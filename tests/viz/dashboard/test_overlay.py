@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dashboard_runs import SCENARIO
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.viz.dashboard.overlay import (
     CLICK_TRACE,
     add_flights,

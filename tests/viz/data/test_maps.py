@@ -6,7 +6,7 @@ import torch
 
 from dashboard_runs import SCENARIO
 from hyuav import Scenario
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.slot import Physics
 from hyuav.physics.tasks import mean_tasks
 from hyuav.viz.data.maps import RULE_MODES, helper_map

@@ -11,7 +11,8 @@ from hyuav._support.errors import InputError
 from hyuav._support.files import read_parquet, write_durably
 from hyuav.experiments.schemes import OPTIMA
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import FlightPolicy, solve_horizons
+from hyuav.references.flight import FlightPolicy
+from hyuav.references.optimum import solve_horizons
 
 
 @dataclass(frozen=True)

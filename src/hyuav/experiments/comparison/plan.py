@@ -34,7 +34,7 @@ from hyuav.learning.registry import ALGORITHMS, PEER, find, is_reference, names
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
-from hyuav.physics.offloading import MODE_RULES, ModeRuleName
+from hyuav.physics.modes import MODE_RULES, ModeRuleName
 from hyuav.physics.scenario import Scenario
 
 ENTRIES = (*ALGORITHMS, PEER)

@@ -11,7 +11,7 @@ from hyuav._support.formatting import percent
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.scenarios import named_scenario
 from hyuav.experiments.schemes import LEARNED, OPTIMA
-from hyuav.physics.offloading import MODE_RULES
+from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.viz.dashboard import draft as drafts
 from hyuav.viz.dashboard.draft_widgets import editor, place

@@ -19,7 +19,8 @@ from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.policy import Policy
 from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import RESOLUTION, FlightPolicy, Optimum, solve_optimum
+from hyuav.references.flight import FlightPolicy
+from hyuav.references.optimum import RESOLUTION, Optimum, solve_optimum
 from hyuav.viz.data.index import RunIndex, Stamp
 
 MOST_SLOTS, MOST_UES = 500, 200

@@ -7,7 +7,6 @@ import pandas as pd
 import torch
 from numpy.typing import NDArray
 
-from hyuav.physics.offloading import prefers_relay
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Control, Physics, slot
 from hyuav.physics.tasks import mean_tasks
@@ -58,7 +57,7 @@ def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
     modes = over.relay, over.jamming
     relay, jamming = torch.broadcast_tensors(*(mode.sum_rate for mode in modes))
     relaying, jammed = (mode.offloading.expand(*x.shape, -1).sum(dim=-1) for mode in modes)
-    chosen = torch.where(prefers_relay(relay, jamming), relaying, jammed)
+    chosen = torch.where(relay > jamming, relaying, jammed)
     better = torch.maximum(relay, jamming)
     return HelperMap(
         axis.numpy(),

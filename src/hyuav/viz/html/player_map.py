@@ -16,7 +16,7 @@ from hyuav.envs.rendering import (
     runs_of_one_mode,
 )
 from hyuav.physics.channel import horizontal_distance
-from hyuav.physics.offloading import covered_by_legitimate, covered_by_relay
+from hyuav.physics.offloading import covered
 from hyuav.physics.scenario import Point, Scenario
 from hyuav.viz.data.flights import Flight
 from hyuav.viz.html.style import translucent
@@ -148,11 +148,7 @@ def _coverage(scenario: Scenario, helper: Point) -> tuple[NDArray[np.bool_], NDA
     ues, radius = torch.tensor(scenario.ue_positions), scenario.coverage_radius
     to_legitimate = horizontal_distance(ues, torch.tensor(scenario.legitimate_position))
     to_helper = horizontal_distance(ues, torch.tensor(helper))
-    anywhere = torch.zeros_like(to_legitimate)
-    return (
-        covered_by_legitimate(to_legitimate, radius).numpy(),
-        covered_by_relay(to_helper, anywhere, radius).numpy(),
-    )
+    return covered(to_legitimate, radius).numpy(), covered(to_helper, radius).numpy()
 
 
 def _circle(center: Point, radius: float) -> tuple[list[float], list[float]]:

@@ -1,0 +1,105 @@
+"""In which modes the helpers work: the argmax of Algorithm 1, over all that they can do."""
+
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
+
+import torch
+from torch import Tensor
+
+from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.parameters import OneOf
+
+
+def mode_vectors(num_helpers: int) -> list[tuple[bool, ...]]:
+    """All modes (k_1, ..., k_H) of the helpers, True where one relays, by sum_i k_i 2^(i - 1)."""
+    return [
+        tuple(bool(number >> helper & 1) for helper in range(num_helpers))
+        for number in range(2**num_helpers)
+    ]
+
+
+class ModeRule(NamedTuple):
+    """Which modes may be chosen, of those that :func:`mode_vectors` lists."""
+
+    allowed: Tensor | bool = True
+    """(..., 2^H) bool, or of all: whether the modes may be chosen at all."""
+    forced: Tensor | bool = False
+    """(..., 2^H) bool, or of all: whether they are the first that may be."""
+
+    @classmethod
+    def of(
+        cls, names: Sequence[str], num_helpers: int, device: torch.device | str | None = None
+    ) -> "ModeRule":
+        """The rules of these names, as :func:`fixed_modes` reads them: flags (len(names), 2^H)."""
+        modes = mode_vectors(num_helpers)
+        of_names = [allowed_vectors(name, num_helpers) for name in names]
+        allowed = torch.tensor([[mode in own for mode in modes] for own in of_names])
+        first = allowed & (allowed.cumsum(dim=-1) == 1)
+        return cls(allowed.to(device), first.to(device))
+
+    def of_mode(self, number: int) -> tuple[Tensor | bool, Tensor | bool]:
+        """Both flags of one of the modes, (..., 1) each."""
+        of = slice(number, number + 1)
+        allowed, forced = (flags if isinstance(flags, bool) else flags[..., of] for flags in self)
+        return allowed, forced
+
+
+MODE_RULES = ("hybrid", "relay", "jamming")
+"""Who chooses the helpers' modes: the best of all in each slot, or always the same."""
+
+ModeRuleName = Annotated[str, OneOf(*MODE_RULES)]
+
+_LETTERS = {"r": True, "j": False}
+
+
+def fixed_modes(mode_rule: str, num_helpers: int, name: str = "scheme") -> tuple[bool, ...] | None:
+    """The modes that a rule prescribes, True where a helper relays; None where they are chosen.
+
+    Args:
+        mode_rule: a name of :data:`MODE_RULES`, or a letter for each helper, "r" where it relays
+            and "j" where it jams.
+        num_helpers: H.
+        name: of what is refused.
+
+    Raises:
+        InputError: it is none of these.
+    """
+    if mode_rule == "hybrid":
+        return None
+    if mode_rule in MODE_RULES:
+        return (mode_rule == "relay",) * num_helpers
+    letters = [_LETTERS.get(letter) for letter in mode_rule] if isinstance(mode_rule, str) else []
+    modes = tuple(relays for relays in letters if relays is not None)
+    if len(modes) == len(letters) == num_helpers:
+        return modes
+    if num_helpers == 1:
+        require_choice(name, mode_rule, MODE_RULES)
+    letters_for_all = f"a letter r or j for each of {num_helpers} helpers"
+    accepted = f"one of {', '.join(MODE_RULES)}, or {letters_for_all}"
+    raise InputError(rejection(name, mode_rule, accepted))
+
+
+def allowed_vectors(mode_rule: str, num_helpers: int) -> list[tuple[bool, ...]]:
+    """The modes that a rule allows, in the order of :func:`mode_vectors`.
+
+    Raises:
+        InputError: as :func:`fixed_modes`.
+    """
+    fixed = fixed_modes(mode_rule, num_helpers)
+    return mode_vectors(num_helpers) if fixed is None else [fixed]
+
+
+def beats(sum_rate: Tensor, best: Tensor, rule: ModeRule, mode: int) -> Tensor:
+    """The argmax of Algorithm 1, one mode after the other: True where this one is taken.
+
+    It is where the sum-rate is larger than the best of the modes before it, so that of equals the
+    first is taken: a tie jams.
+
+    Args:
+        sum_rate: C_k of this mode, (..., 1) bps/Hz.
+        best: the largest of the modes before it that are allowed, (..., 1) bps/Hz.
+        rule: that decides which are.
+        mode: the number of this one.
+    """
+    allowed, forced = rule.of_mode(mode)
+    return ((sum_rate > best) | forced) & allowed

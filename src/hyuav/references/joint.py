@@ -1,0 +1,195 @@
+"""The best flights of several helpers that are found: lower bounds that are nearly tight.
+
+The flights of two helpers are first found together, by dynamic programming over all pairs of
+places of a coarse grid; the reach of both is a box in each coordinate, so a backward step is four
+one-dimensional maxima. The flights of more helpers begin as straight lines. Then each helper's
+flight in turn is the best one with the others' held, on a fine grid, until nothing improves. What
+comes out can be flown, so its return is a lower bound of the optimum.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hyuav.physics.scenario import Point
+from hyuav.physics.slot import Physics
+from hyuav.references.grid import (
+    Grid,
+    Reach,
+    Values,
+    best_flight,
+    grid_over_map,
+    reaches_of,
+    values_to_go,
+)
+from hyuav.references.power import best_levels, levels_of
+from hyuav.references.rewards import ExpectedReward
+from hyuav.references.straight import jamming_destinations, relay_destination
+
+COARSE = 10.0
+"""Spacing in m of the grid on which two helpers' flights are found together, at least."""
+
+COARSE_LEVELS = 15.0
+"""Step in dB between the levels of power that are tried there."""
+
+WINDOW = 10.0
+"""How far in m a slot's place moves at most in one improvement."""
+
+TURNS = 60
+"""Improvements at most, each of one helper's flight."""
+
+Plan = tuple[Tensor, Tensor]
+"""A path (T + 1, H, 2) m and powers (T, H), in units of the nominal power."""
+
+
+class SeveralHelpers:
+    """The best flights of several helpers that are found.
+
+    Args:
+        physics: in float64.
+        resolution: spacing in m of the grid on which flights end.
+        power_step: between the levels of power in dB.
+        draws: of a slot's fading and tasks that the expected reward is averaged over.
+        seed: of the draws.
+    """
+
+    def __init__(
+        self, physics: Physics, resolution: float, power_step: float, draws: int, seed: int
+    ) -> None:
+        generator = torch.Generator().manual_seed(seed)
+        self._physics, self._resolution, self._step = physics, resolution, power_step
+        self._expected = ExpectedReward(physics, draws, generator)
+        self._quiet = ExpectedReward(physics, 1, generator)
+        helpers = range(physics.scenario.num_helpers)
+        self._grids = [grid_over_map(physics.scenario, resolution, helper) for helper in helpers]
+
+    def best(self, mode_rule: str, num_slots: int) -> Plan:
+        """The best flights over so many slots."""
+        plans = [
+            self._improved(self._quiet, mode_rule, plan)
+            for plan in self._beginnings(mode_rule, num_slots)
+        ]
+        best = max(plans, key=lambda plan: self._earned(self._quiet, mode_rule, plan))
+        return self._improved(self._expected, mode_rule, best)
+
+    def _earned(self, expected: ExpectedReward, mode_rule: str, plan: Plan) -> float:
+        return float(expected([mode_rule], plan[0][1:], plan[1]).sum())
+
+    def _beginnings(self, mode_rule: str, num_slots: int) -> Iterator[Plan]:
+        """Flights to begin with."""
+        scenario = self._physics.scenario
+        if scenario.num_helpers == 2:
+            yield self._joint_plan(mode_rule, num_slots)
+            return
+        jamming, relay = jamming_destinations(scenario), relay_destination(scenario)
+        for jammers in range(scenario.num_helpers + 1):
+            ends = [*jamming[:jammers], *[relay] * (scenario.num_helpers - jammers)]
+            path = _straight(self._physics, ends, num_slots)
+            yield path, torch.ones(num_slots, scenario.num_helpers, dtype=path.dtype)
+
+    def _joint_plan(self, mode_rule: str, num_slots: int) -> Plan:
+        """The best flight of two helpers on a coarse grid."""
+        spacing = max(COARSE, self._resolution)
+        grids = [grid_over_map(self._physics.scenario, spacing, helper) for helper in range(2)]
+        reaches = reaches_of(self._physics, mode_rule, spacing)
+        rewards, power = self._joint_rewards(mode_rule, grids)
+        values = [np.zeros_like(rewards)]
+        for _ in range(num_slots - 1):
+            best = rewards + values[-1]
+            for helper, reach in enumerate(reaches):
+                best = reach.best(best, helper)
+            values.append(best)
+        points = [grid.start for grid in grids]
+        flight, chosen = [points], []
+        for value in reversed(values):
+            one, other = (
+                reach.within(grid, point)
+                for reach, grid, point in zip(reaches, grids, points, strict=True)
+            )
+            both = one[:, :, None, None] & other
+            points = _nearest_best(np.where(both, rewards + value, -np.inf), points)
+            flight.append(points)
+            chosen.append(power[(*points[0], *points[1])])
+        steps = np.array(flight)
+        places = [grid.places(steps[:, helper]) for helper, grid in enumerate(grids)]
+        return torch.stack(places, dim=1), torch.stack(chosen)
+
+    def _joint_rewards(self, mode_rule: str, grids: Sequence[Grid]) -> tuple[Values, Tensor]:
+        """Of all pairs of places with their best powers: (X, Y, X', Y'), and (..., 2)."""
+        one, other = (grid.positions() for grid in grids)
+        size = len(one), len(other)
+        pairs = torch.stack(
+            [one.unsqueeze(1).expand(*size, 2), other.expand(*size, 2)], dim=-2
+        ).flatten(0, 1)
+        levels = levels_of(self._physics.scenario, COARSE_LEVELS).tolist()
+        best = torch.full((len(pairs),), -torch.inf, dtype=pairs.dtype)
+        power = torch.ones(len(pairs), 2, dtype=pairs.dtype)
+        for both in product(levels, repeat=2):
+            own = torch.tensor(both, dtype=pairs.dtype).expand_as(power)
+            reward = self._quiet([mode_rule], pairs, own)[0]
+            better = (reward > best).unsqueeze(-1)
+            power, best = torch.where(better, own, power), torch.maximum(best, reward)
+        shape = *grids[0].shape, *grids[1].shape
+        return best.reshape(shape).numpy(), power.reshape(*shape, 2)
+
+    def _improved(self, expected: ExpectedReward, mode_rule: str, plan: Plan) -> Plan:
+        """Flights improved in turn until none improves."""
+        reaches = reaches_of(self._physics, mode_rule, self._resolution)
+        value, unimproved = self._earned(expected, mode_rule, plan), 0
+        for turn in range(TURNS):
+            helper = turn % len(reaches)
+            own = self._best_of_one(expected, mode_rule, plan, helper, reaches[helper])
+            found = self._earned(expected, mode_rule, own)
+            unimproved += 1
+            if found > value + 1e-9:
+                plan, value, unimproved = own, found, 0
+            if unimproved == len(reaches):
+                break
+        return plan
+
+    def _best_of_one(
+        self, expected: ExpectedReward, mode_rule: str, plan: Plan, helper: int, reach: Reach
+    ) -> Plan:
+        """The plan with one helper's flight as good as can be near its own, the others' held."""
+        (path, power), grid = plan, self._grids[helper]
+        positions = grid.positions()
+        rewards, levels = [], []
+        for places, shares in zip(path[1:], power, strict=True):
+            near = ((positions - places[helper]).abs() <= WINDOW).all(dim=-1)
+            candidates = places.expand(int(near.sum()), -1, -1).clone()
+            candidates[:, helper] = positions[near]
+            others = shares.expand(len(candidates), -1)
+            found, level = best_levels(
+                expected, self._quiet, [mode_rule], candidates, others, helper, self._step
+            )
+            reward, share = torch.full((2, len(positions)), -torch.inf, dtype=path.dtype)
+            reward[near], share[near] = found[0], level[0]
+            rewards.append(reward.reshape(grid.shape).numpy())
+            levels.append(share.reshape(grid.shape))
+        flight = best_flight(rewards, values_to_go(rewards, reach), reach, grid.start)
+        path, power = path.clone(), power.clone()
+        path[:, helper] = grid.places(flight)
+        for slot, (row, column) in enumerate(flight[1:]):
+            power[slot, helper] = levels[slot][row, column]
+        return path, power
+
+
+def _straight(physics: Physics, destinations: Sequence[Point], num_slots: int) -> Tensor:
+    """Straight flights, as fast as half the speed limit, and then hovering: (T + 1, H, 2) m."""
+    scenario, starts = physics.scenario, physics.nodes.helper
+    way = torch.tensor(destinations, dtype=starts.dtype) - starts
+    step = scenario.max_speed * scenario.slot_duration / 2
+    slots = torch.arange(num_slots + 1, dtype=starts.dtype).reshape(-1, 1, 1)
+    length = torch.linalg.vector_norm(way, dim=-1, keepdim=True).clamp(min=1e-9)
+    return starts + way * (slots * step / length).clamp(max=1.0)
+
+
+def _nearest_best(values: Values, points: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The grid points with the largest value; of equals those nearest to ``points``."""
+    best = np.argwhere(values == values.max())
+    moved = ((best - np.concatenate(points)) ** 2).sum(axis=-1)
+    row, column, other_row, other_column = (int(index) for index in best[moved.argmin()])
+    return [(row, column), (other_row, other_column)]
