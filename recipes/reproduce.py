@@ -15,7 +15,7 @@ import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to loa
 # isort: split
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -40,10 +40,10 @@ from hyuav._support.parameters import (
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
 from hyuav.experiments.elsewhere import horizon_directory
-from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
+from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.experiments.evaluation_table import print_results
 from hyuav.experiments.initial_weights import select_initial_weights
-from hyuav.experiments.policies import learned_policies, reference_policies
+from hyuav.experiments.policies import Policies, learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
 from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
@@ -175,7 +175,7 @@ class Work:
         run: RunDirectory,
         scenario: Scenario,
         directory: Path,
-        beside: Mapping[str, list[Policy]] | None = None,
+        beside: Policies | None = None,
     ) -> Evaluation:
         """Fly a run's actors, what stands beside them and the references; keep what came of it."""
         policies = {

@@ -1,6 +1,7 @@
 """The environment with several helpers and eavesdroppers, and with power control."""
 
 import dataclasses
+from typing import Any
 
 import pytest
 import torch
@@ -136,6 +137,6 @@ def test_modes_that_do_not_fit_the_helpers_are_refused(scheme: str) -> None:
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, 120.1, "60"])
-def test_a_power_range_out_of_reach_is_refused(value: object) -> None:
+def test_a_power_range_out_of_reach_is_refused(value: Any) -> None:
     with pytest.raises(InputError, match=r"^power_range = .*expected"):
         dataclasses.replace(POWER, power_range=value)

@@ -15,7 +15,6 @@ from hyuav import (
     EvaluationParameters,
     FlightPolicy,
     Learner,
-    Policy,
     Scenario,
     ScenarioWarning,
     Training,
@@ -116,7 +115,7 @@ def train() -> Training:
 
 
 def fly() -> Any:
-    policies = {"optimum": [Policy(FlightPolicy(torch.zeros(5, 1, 2), ONE_UE))]}
+    policies = {"optimum": [FlightPolicy(torch.zeros(5, 1, 2), ONE_UE)]}
     return evaluate(ONE_UE, "one", policies, EvaluationParameters(episodes=2, flights=1))
 
 

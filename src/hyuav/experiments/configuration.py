@@ -65,12 +65,12 @@ def register(groups: Mapping[str, str]) -> None:
             free for a plain entry.
     """
     store = ConfigStore.instance()
-    members: dict[str, Mapping[str, dict[str, Any]]] = {
+    members: dict[str, dict[str, Config]] = {
         "scenario": {name: {"name": name, **offered(name)} for name in NAMES},
         "algorithm": {
             file_name(name): {"name": name, **kind().to_dict()} for name, kind in ALGORITHMS.items()
         },
-        LOGGER: loggers(groups.get(LOGGER, "")),
+        LOGGER: {**loggers(groups.get(LOGGER, ""))},
     }
     if groups.get("scenario") == AS_TRAINED:
         members["scenario"][AS_TRAINED] = as_trained()

@@ -328,6 +328,7 @@ class Physics:
         """The slot in given modes of the helpers; each UE takes its own best way (eq. 5 and 11)."""
         scenario = self.scenario
         ways = self._ways(geometry, gains, sent, relays)
+        way: Tensor | int
         way, rate, allowed = ways[0]
         for number, other_rate, other_allowed in ways[1:]:
             better = other_allowed & ((other_rate > rate) | ~allowed)

@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
+from hyuav.experiments.elsewhere import horizon_directory
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.experiments.policies import reference_policies
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.viz.data.runs import horizon_directory
 from hyuav.viz.html.document import Page, Section
 from hyuav.viz.html.run import run_page
 

@@ -10,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from hyuav import InputError, Scenario
+from hyuav.experiments.elsewhere import horizon_directory
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
@@ -17,7 +18,7 @@ from hyuav.experiments.train import train
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
+from hyuav.viz.data.runs import AS_IN_PAPER
 from hyuav.viz.paper.gallery import FIGURES, draw
 
 OFF = LoggerParameters(mode="disabled")
