@@ -55,17 +55,17 @@ def diagnose(
     """
     cpu_cycles, offloading = tasks.cpu_cycles, slot.offloading
     duration, num_ues, power = scenario.slot_duration, scenario.num_ues, slot.control.power
-    sending = torch.where(
-        slot.relays,
-        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=True),
-        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=False),
+    relayed, direct = (
+        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=relay)
+        for relay in (True, False)
     )
+    sending = torch.full_like(edge_load, direct).masked_fill(slot.relays, relayed)
     local = energy.computation_energy(cpu_cycles / duration, scenario.capacitance, duration)
     ue_energy = torch.where(offloading, sending, local)
     edge_energy = energy.computation_energy(edge_load / duration, scenario.capacitance, duration)
     transmitting = torch.where(
         slot.relays,
-        energy.relay_energy(offloading, scenario.relay_power * power, duration),
+        energy.relay_energy(offloading.to(edge_load.dtype), scenario.relay_power * power, duration),
         energy.jamming_energy(scenario.jamming_power * power, duration),
     )
     flying = energy.flight_energy(slot.control.velocity, scenario.helper_mass, duration)

@@ -10,7 +10,7 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 
 from hyuav.envs.observation import ObservationLayout
-from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
+from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, made_on
 from hyuav.learning.weights import load_weights, select_learners
 from hyuav.physics.scenario import Scenario
 
@@ -42,7 +42,7 @@ def fly_noise_free(
     """
     scenario, learners = env.base_env.scenario, env.batch_size[0]
     layout = ObservationLayout(scenario, clock=False)  # places stand first, clock or not
-    off_map, control_term = torch.zeros(2, learners, device=env.device)
+    off_map, control_term = torch.zeros(2, learners, dtype=torch.float32, device=env.device)
     state, positions = env.reset(), []
     for _ in range(scenario.num_slots):
         slot = env.step(algorithm.actor(state))
@@ -83,7 +83,8 @@ class LearnedPolicy(TensorDictModuleBase):
         super().__init__()
         self._several = not isinstance(learner, int)
         learners = [learner] if isinstance(learner, int) else learner
-        built = algorithm.build(len(learners), scenario)
+        with made_on(torch.device("cpu")):
+            built = algorithm.build(len(learners), scenario)
         load_weights(built.loss, select_learners(weights, learners))
         self.actor = built.actor
 

@@ -23,7 +23,7 @@ def relay_energy(offloading: Tensor, relay_power: Tensor | float, slot_duration:
     """Transmission energy in relay mode, sum_u z_u p_R Delta / (2 U) in J.
 
     Args:
-        offloading: (..., U) bool, z_u.
+        offloading: (..., U), z_u, 0 or 1 in the type of the result.
         relay_power: p_R in W, (..., H) or of all.
         slot_duration: Delta in s.
 

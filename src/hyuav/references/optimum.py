@@ -182,7 +182,7 @@ def solve_horizons(
     evaluation_draws = checked(_Draws, "evaluation_draws", evaluation_draws)
     require_resolution(resolution, scenario.map_side, longest)
     root = torch.Generator().manual_seed(as_seed(seed))
-    map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root).tolist()
+    map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root, device="cpu").tolist()
 
     physics = Physics(scenario, dtype=torch.float64)
     grid = grid_over_map(scenario, resolution)
@@ -266,5 +266,5 @@ def _flyable(path: Tensor, physics: Physics, mode_rule: str) -> Tensor:
 
 
 def _power(scenario: Scenario, modes: Tensor) -> Tensor:
-    powers = torch.tensor([scenario.jamming_power, scenario.relay_power], dtype=torch.float64)
-    return powers[modes]
+    powers = scenario.jamming_power, scenario.relay_power
+    return torch.tensor(powers, dtype=torch.float64, device=modes.device)[modes]

@@ -37,7 +37,9 @@ def reward_maps(
         _stratified_fading(physics, draws, generator),
         _tasks(physics, (draws,), generator),
     )
-    maps = torch.empty(len(MODE_RULES), len(positions), dtype=positions.dtype)
+    maps = torch.empty(
+        len(MODE_RULES), len(positions), dtype=positions.dtype, device=positions.device
+    )
     chunk = max(_CHUNK // (draws * physics.scenario.num_ues), 1)
     for part, out in zip(positions.split(chunk), maps.split(chunk, dim=1), strict=True):
         rewards = _rewards(physics, part[:, None, None], (len(part), draws), fading, tasks)
@@ -68,7 +70,7 @@ def estimate_return(
     num_slots = len(path) - 1
     draws = draws if _is_random(physics) else 1
     chunk = max(_CHUNK // (num_slots * physics.scenario.num_ues), 1)
-    total = torch.zeros(len(MODE_RULES), num_slots, dtype=path.dtype)
+    total = torch.zeros(len(MODE_RULES), num_slots, dtype=path.dtype, device=path.device)
     returns = []
     for first in range(0, draws, chunk):
         shape = (min(chunk, draws - first), num_slots)
@@ -83,8 +85,8 @@ def estimate_return(
     relay, jamming = total[MODE_RULES.index("relay")], total[MODE_RULES.index("jamming")]
     modes = {
         "hybrid": prefers_relay(relay, jamming).to(torch.int64),
-        "relay": torch.ones(num_slots, dtype=torch.int64),
-        "jamming": torch.zeros(num_slots, dtype=torch.int64),
+        "relay": torch.ones(num_slots, dtype=torch.int64, device=path.device),
+        "jamming": torch.zeros(num_slots, dtype=torch.int64, device=path.device),
     }
     return float(episodes.mean()), error, modes[mode_rule].unsqueeze(-1)
 
@@ -112,7 +114,9 @@ def _stratified_fading(physics: Physics, draws: int, generator: torch.Generator)
         return None
     links = fading.shape[-1]
     strata = fading.reshape(-1, links).sort(dim=0).values.reshape(draws, _STRATUM, links)
-    shuffled = torch.rand((draws, links), generator=generator).argsort(dim=0)
+    shuffled = torch.rand(
+        (draws, links), generator=generator, dtype=torch.float32, device=generator.device
+    ).argsort(dim=0)
     return physics.link_row.unflatten(strata.mean(dim=1).gather(0, shuffled))
 
 

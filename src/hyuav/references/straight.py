@@ -56,7 +56,7 @@ class ConstantVelocity(TensorDictModuleBase):
             scenario, destination, math.hypot(*velocity), affordable, "helper_energy_budget"
         )
         action = [component / scenario.max_speed for component in velocity]
-        self.register_buffer("action", torch.tensor(action))
+        self.register_buffer("action", torch.tensor(action, dtype=torch.float32, device="cpu"))
 
     @staticmethod
     def _require_speed(

@@ -16,6 +16,7 @@ from hyuav.envs.rendering import (
     runs_of_one_mode,
 )
 from hyuav.physics.channel import horizontal_distance
+from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import covered_by_legitimate, covered_by_relay
 from hyuav.physics.scenario import Point, Scenario
 from hyuav.viz.data.flights import Flight
@@ -145,9 +146,9 @@ def _ues(scenario: Scenario, flight: Flight, slot: int, helper: Point) -> list[T
 
 def _coverage(scenario: Scenario, helper: Point) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which UEs eq. 5 lets jam, and which it lets relay, were the helper there: (U,) each."""
-    ues, radius = torch.tensor(scenario.ue_positions), scenario.coverage_radius
-    to_legitimate = horizontal_distance(ues, torch.tensor(scenario.legitimate_position))
-    to_helper = horizontal_distance(ues, torch.tensor(helper))
+    nodes, radius = Nodes.of(scenario, "cpu"), scenario.coverage_radius
+    to_legitimate = horizontal_distance(nodes.ue, nodes.legitimate)
+    to_helper = horizontal_distance(nodes.ue, nodes.legitimate.new_tensor(helper))
     anywhere = torch.zeros_like(to_legitimate)
     return (
         covered_by_legitimate(to_legitimate, radius).numpy(),
