@@ -8,8 +8,8 @@ warms it up, ``run`` lets it advance for a while, ``job`` takes it from nothing 
 import importlib
 import importlib.util
 import json
+import math
 import os
-import resource
 import sys
 import time
 import types
@@ -106,12 +106,17 @@ def peak_memory() -> dict[str, Any]:
     return peaks
 
 
-def _peak_bytes() -> int:
+def _peak_bytes() -> float:
+    """NaN where the system does not tell."""
     status = Path("/proc/self/status")
     if status.exists():  # Linux's getrusage would count what the parent held when it forked
         lines = status.read_text(encoding="utf-8").splitlines()
         (peak,) = (line.split()[1] for line in lines if line.startswith("VmHWM"))
         return int(peak) * 2**10
+    try:
+        import resource
+    except ImportError:
+        return math.nan
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 

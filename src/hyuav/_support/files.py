@@ -21,6 +21,9 @@ from pyarrow.lib import ArrowException
 from hyuav._support.errors import InputError, one_line, rejection
 from hyuav._support.machine import device_memory
 
+READING = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+"""Without waiting for a pipe where there are any, and without Windows' other line ends."""
+
 
 def open_regular(path: Path) -> BinaryIO:
     """A file to read from that is one, also at the end of a link, and fits the memory.
@@ -28,7 +31,7 @@ def open_regular(path: Path) -> BinaryIO:
     Raises:
         OSError: there is none, it cannot be read, or it is a directory, a pipe or a device.
     """
-    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    number = os.open(path, READING)
     state = os.fstat(number)
     if not stat.S_ISREG(state.st_mode):
         os.close(number)

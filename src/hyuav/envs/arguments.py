@@ -123,7 +123,7 @@ def as_device(device: torch.device | str | None) -> torch.device:
 def as_seed(seed: int | None) -> int:
     """A seed as it is, or one drawn from PyTorch's global generator where none is given."""
     if seed is None:
-        return int(torch.randint(2**62, ()))
+        return int(torch.randint(2**62, (), device="cpu"))
     accepted = "a whole number in [0, 2^63)"
     try:
         number = operator.index(seed)

@@ -56,23 +56,22 @@ def diagnose(
     """
     cpu_cycles, offloading = tasks.cpu_cycles, slot.offloading
     duration, num_ues = scenario.slot_duration, scenario.num_ues
-    power = 1.0 if slot.control.power is None else slot.control.power
     relays, way = slot.relays, slot.way
-    sending = torch.where(
-        way > 0,
-        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=True),
-        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=False),
+    relayed, straight = (
+        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=relay)
+        for relay in (True, False)
     )
+    sending = torch.full_like(cpu_cycles, straight).masked_fill(way > 0, relayed)
     local = energy.computation_energy(cpu_cycles / duration, scenario.capacitance, duration)
     ue_energy = torch.where(offloading, sending, local)
     edge_energy = energy.computation_energy(edge_load / duration, scenario.capacitance, duration)
     helpers = torch.arange(1, scenario.num_helpers + 1, device=way.device)
-    relayed = ((way * offloading).unsqueeze(-1) == helpers).sum(dim=-2)
-    transmitting = power * torch.where(
-        relays,
-        energy.relay_energy(relayed, scenario.relay_power, duration / num_ues),
-        energy.jamming_energy(scenario.jamming_power, duration),
-    )
+    through = ((way * offloading).unsqueeze(-1) == helpers).sum(dim=-2).to(edge_load.dtype)
+    relaying = energy.relay_energy(through, scenario.relay_power, duration / num_ues)
+    jamming = energy.jamming_energy(scenario.jamming_power, duration)
+    transmitting = torch.where(relays, relaying, torch.full_like(relaying, jamming))
+    if slot.control.power is not None:
+        transmitting = transmitting * slot.control.power
     flying = energy.flight_energy(slot.control.velocity, scenario.helper_mass, duration)
     helper_energy = flying + transmitting
     violations = (

@@ -56,7 +56,9 @@ class Draws:
             self._places[name] = columns * GAMMA, helpers * width * GAMMA, inner.numel() * width
         trailing = (1,) * self._rank
         self._law = RicianFading.of(physics.k_factor.reshape(-1, *trailing))
-        self._slots = dict.fromkeys(NAMES, 0)
+        # Tensors, so that a graph that torch.compile makes of a slot counts on; where a GPU need
+        # not be waited for.
+        self._slots = dict.fromkeys(NAMES, _count(0))
         self._blocks: dict[str, tuple[int, Tensor]] = {}
 
     def _tensor(self, values: object) -> Tensor:
@@ -81,9 +83,9 @@ class Draws:
 
     def ticket(self, *, tasks: bool) -> tuple[Tensor, Tensor]:
         """What decides the next slot's fading and, if wanted, tasks; it counts as drawn."""
-        slots = self._tensor([*self._slots.values()])
-        self._slots["fading"] += self._physics.scenario.fading
-        self._slots["tasks"] += tasks
+        slots = torch.stack([*self._slots.values()]).to(self._keys.device)
+        for name, drawn in zip(NAMES, (self._physics.scenario.fading, tasks), strict=True):
+            self._slots[name] = self._slots[name] + int(drawn)
         return self._keys, slots
 
     def redeem(self, keys: Tensor, slots: Tensor) -> tuple[Tensor | None, Tasks]:
@@ -95,12 +97,12 @@ class Draws:
 
     def state(self) -> dict[str, Any]:
         """Where the random numbers stand, for :meth:`set_state`."""
-        return {"keys": self._keys.cpu(), **self._slots}
+        return {"keys": self._keys.cpu(), **{name: int(own) for name, own in self._slots.items()}}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Continue where :meth:`state` was taken from draws of as many distinct seeds."""
         self._keys = state["keys"].to(self._keys.device).reshape(self._keys.shape)
-        self._slots = {name: int(state[name]) for name in NAMES}
+        self._slots = {name: _count(int(state[name])) for name in NAMES}
         self._blocks.clear()
 
     def _spread(self, numbers: Tensor) -> Tensor:
@@ -116,19 +118,26 @@ class Draws:
         return numbers.index_select(axis, self.rows)
 
     def _next(self, name: str) -> Tensor:
-        """The next slot's numbers, several slots of which are drawn at once."""
-        block, place = divmod(self._slots[name], self._at_once)
+        """The next slot's numbers, several slots of which are drawn at once, but in a graph."""
+        slots = self._slots[name]
+        if torch.compiler.is_compiling():
+            numbers = self._numbers(name, self._keys[NAMES.index(name)], slots)
+            self._slots[name] = slots + 1
+            return numbers
+        block, place = divmod(int(slots), self._at_once)
         drawn, numbers = self._blocks.get(name, (-1, self._keys))
         if drawn != block:
-            slot, self._slots[name] = self._slots[name], block * self._at_once
-            numbers = self._take(name, self._at_once)
-            self._blocks[name], self._slots[name] = (block, numbers), slot
-        self._slots[name] += 1
+            numbers = self._of_slots(name, block * self._at_once, self._at_once)
+            self._blocks[name] = block, numbers
+        self._slots[name] = slots + 1
         return numbers[place]
 
     def _take(self, name: str, count: int) -> Tensor:
-        first = self._slots[name]
-        self._slots[name] += count
+        numbers = self._of_slots(name, int(self._slots[name]), count)
+        self._slots[name] = self._slots[name] + count
+        return numbers
+
+    def _of_slots(self, name: str, first: int, count: int) -> Tensor:
         slots = torch.arange(first, first + count, device=self._keys.device)
         slots = slots.reshape(-1, 1, *(1,) * self._rank)
         return self._numbers(name, self._keys[NAMES.index(name)], slots).contiguous()
@@ -148,6 +157,10 @@ class Draws:
 
     def _as_tasks(self, levels: Tensor) -> Tasks:
         return tasks_at(self._physics.scenario, *levels.chunk(2, dim=-1))
+
+
+def _count(slots: int) -> Tensor:
+    return torch.tensor(slots, dtype=torch.int64, device="cpu")
 
 
 class GivenDraws:

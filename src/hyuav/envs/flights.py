@@ -54,7 +54,7 @@ class Flights:
         A distance is at most the map's diagonal, sqrt(8) of the half sides it is measured in.
         """
         layout = self.env.transform[-1].layout
-        high = torch.ones(layout.size)
+        high = torch.ones(layout.size, dtype=torch.float32, device="cpu")
         layout.distances(high).fill_(math.sqrt(8.0) - 1.0 + 1e-5)  # float32 rounding
         observed = Box(np.full(layout.size, -1.0, np.float32), high.numpy(), dtype=np.float32)
         return observed, Box(-1.0, 1.0, (layout.action_size,), np.float32)
@@ -86,9 +86,10 @@ class Flights:
         state["action"] = _as_tensor("action", action, (shape,), self.env.device)
         flown = self.env.step(state)
         after = flown["next"]
-        sum_rate = after["reward"] + self.scenario.off_map_penalty * after["off_map"]
+        reward = after["reward"]
+        sum_rate = reward + self.scenario.off_map_penalty * after["off_map"].to(reward.dtype)
         self._enter(self.env.step_mdp(flown))
-        return _column(after["reward"]), _column(sum_rate), _column(after["truncated"])
+        return _column(reward), _column(sum_rate), _column(after["truncated"])
 
     def observation(self) -> Floats:
         """The normalized observation: (*B, observed)."""

@@ -93,13 +93,15 @@ class JointView(Transform):
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
         """Write the observation beside the entries that it is made of."""
+        position, mode = next_tensordict["position"], next_tensordict["mode"]
         parts = [
-            next_tensordict["position"].flatten(-2) / self._half_side,
-            next_tensordict["mode"] * 2.0 - 1.0,
+            position.flatten(-2) / self._half_side,
+            mode.to(position.dtype) * 2.0 - 1.0,
             next_tensordict["distances"].flatten(-2) * (1.0 / self._half_side) - 1.0,
         ]
         if self._half_horizon is not None:
-            parts.append(next_tensordict["step_count"] / self._half_horizon - 1.0)
+            flown = next_tensordict["step_count"].to(position.dtype)
+            parts.append(flown / self._half_horizon - 1.0)
         next_tensordict["observation"] = torch.cat(parts, dim=-1)
         return next_tensordict
 

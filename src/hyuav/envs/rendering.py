@@ -7,7 +7,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import torch
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hyuav._support.errors import InputError, rejection
 from hyuav.physics.channel import horizontal_distance
+from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import covered
 from hyuav.physics.scenario import Point, Scenario
 
@@ -189,11 +189,11 @@ class FlightRecorder:
 
 def _covered(scenario: Scenario, helper: Point, *, relay: bool) -> NDArray[np.bool_]:
     """Eq. 5 with the helper at ``helper``: (U,)."""
-    ues, radius = torch.tensor(scenario.ue_positions), scenario.coverage_radius
-    to_legitimate = horizontal_distance(ues, torch.tensor(scenario.legitimate_position))
-    reached = covered(to_legitimate, radius)
+    nodes, radius = Nodes.of(scenario, "cpu"), scenario.coverage_radius
+    reached = covered(horizontal_distance(nodes.ue, nodes.legitimate), radius)
     if relay:
-        reached &= covered(horizontal_distance(ues, torch.tensor(helper)), radius)
+        to_helper = horizontal_distance(nodes.ue, nodes.legitimate.new_tensor(helper))
+        reached &= covered(to_helper, radius)
     return reached.numpy()
 
 

@@ -33,8 +33,9 @@ class OffMapPenalty(Transform):
 
     def _step(self, _: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
         """Apply the penalty to the step that was just taken."""
-        penalty = self.penalty * next_tensordict["off_map"].sum(dim=-1, keepdim=True)
-        next_tensordict["reward"] = next_tensordict["reward"] - penalty
+        reward, off_map = next_tensordict["reward"], next_tensordict["off_map"]
+        penalty = self.penalty * off_map.sum(dim=-1, keepdim=True, dtype=reward.dtype)
+        next_tensordict["reward"] = reward - penalty
         return next_tensordict
 
 
@@ -115,7 +116,7 @@ def make_env(
     checked(bool, "geofence", geofence)
     env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics, fading)
     kind = CompiledEnv if checked(bool, "compiled", compiled) else TransformedEnv
-    return kind(
+    transformed = kind(
         env,
         Compose(
             *([Geofence(env.scenario)] if geofence else []),
@@ -126,3 +127,5 @@ def make_env(
         ),
         device=env.device,
     )
+    _ = transformed.input_spec  # kept from now on: torch.compile cannot record how it is made
+    return transformed

@@ -59,7 +59,7 @@ class Afterstate(nn.Module):
         if self._geofence:
             action = fenced(scenario, position, action)
         moved = self._physics.move(position, self._physics.velocity(action, self._norm_limit))
-        beside = moved.off_map.unsqueeze(-1) * 2.0 - 1.0
+        beside = moved.off_map.unsqueeze(-1).to(position.dtype) * 2.0 - 1.0
         return self._features(moved.position, beside, self.layout.clock(observation))
 
     def at(self, place: Tensor, clock: Tensor) -> Tensor:

@@ -2,7 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -29,6 +30,21 @@ Sizes = Annotated[
     Field(min_length=1, description="the sizes of at least one hidden layer"),
 ]
 ActionScale = Annotated[float, Field(ge=1.0, le=2.0)]
+
+
+@contextmanager
+def made_on(device: torch.device) -> Iterator[None]:
+    """Inside it, tensors that do not say otherwise are made on a device, in float32.
+
+    So are those of TorchRL and of networks of your own, whatever PyTorch's defaults are.
+    """
+    default = torch.get_default_dtype()
+    torch.set_default_dtype(torch.float32)
+    try:
+        with device:
+            yield
+    finally:
+        torch.set_default_dtype(default)
 
 
 @pydantic_dataclass(frozen=True)

@@ -222,7 +222,7 @@ def optimizer_like(optimizer: Mapping[str, Any]) -> dict[str, Any]:
     """An example of the state of Adam, from the state of one on the same weights."""
 
     def require_step(name: str, value: Any) -> None:
-        require_like(name, value, torch.zeros(()))
+        require_like(name, value, torch.zeros((), dtype=torch.float32, device="cpu"))
         checked(NonNegativeNumber, name, value)
 
     moments = {index: {**own, "step": require_step} for index, own in optimizer["state"].items()}

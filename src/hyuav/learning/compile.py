@@ -87,7 +87,8 @@ class CompiledSlots:
         self._cursor = torch.zeros(1, dtype=torch.int64, device=device)
         self._length = torch.zeros(1, dtype=torch.int64, device=device)
         self._totals = {
-            name: torch.zeros(learners, device=device) for name in ("reward", *self._adam)
+            name: torch.zeros(learners, dtype=torch.float32, device=device)
+            for name in ("reward", *self._adam)
         }
         self._finite = torch.zeros(learners, dtype=torch.int64, device=device)
         no_slots = self._inputs(algorithm.guide.plan(episode=1), 0, 0)

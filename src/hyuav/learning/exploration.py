@@ -31,7 +31,7 @@ class GaussianNoise(TensorDictModuleBase):
     def __init__(self, learners: int, variance: float, decay: float, decay_per: str) -> None:
         super().__init__()
         self.decay, self.decay_per = decay, decay_per
-        self.register_buffer("std", torch.full((learners, 1), variance**0.5))
+        self.register_buffer("std", torch.full((learners, 1), variance**0.5, dtype=torch.float32))
         self.register_buffer("fresh", torch.ones(learners, 1, dtype=torch.bool))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -40,7 +40,7 @@ class GaussianNoise(TensorDictModuleBase):
             finished = ~self.fresh
         else:
             finished = ~self.fresh & (tensordict["step_count"] == 0)
-        self.std.mul_(torch.where(finished, self.decay, 1.0))
+        self.std.copy_(torch.where(finished, self.std * self.decay, self.std))
         self.fresh.fill_(False)
         action = tensordict["action"]
         noisy = action + self.std * torch.randn_like(action)

@@ -18,7 +18,7 @@ from hyuav._support.parameters import Count, checked
 from hyuav.envs.arguments import as_scenario
 from hyuav.envs.observation import ObservationLayout
 from hyuav.envs.transforms import make_env
-from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
+from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, made_on
 from hyuav.learning.export import export
 from hyuav.learning.weights import load_weights, select_learners
 from hyuav.physics.modes import MODE_RULES
@@ -54,7 +54,7 @@ def fly_noise_free(
     """
     scenario, learners = env.base_env.scenario, env.batch_size[0]
     layout = ObservationLayout(scenario, clock=False)  # places stand first, clock or not
-    off_map, control_term = torch.zeros(2, learners, device=env.device)
+    off_map, control_term = torch.zeros(2, learners, dtype=torch.float32, device=env.device)
     state, positions = env.reset(), []
     for _ in range(scenario.num_slots):
         slot = env.step(algorithm.actor(state))
@@ -296,7 +296,7 @@ def learned_policy(
     """
     own = select_learners(weights, learners)
     like = next(iter(own.values()))  # rather than the default device and type of tensors
-    with like.device:
+    with made_on(like.device):
         built = algorithm.build(len(learners), scenario)
     load_weights(built.loss, own)
     actor = built.actor.to(like.dtype)

@@ -78,7 +78,7 @@ def latest(replay: ReplayBuffer, count: int) -> Tensor:
     They are fewer where the storage is smaller.
     """
     capacity = replay.storage.max_size
-    ages = torch.arange(min(count, capacity), 0, -1)
+    ages = torch.arange(min(count, capacity), 0, -1, device=replay.storage.device)
     return (cursor_of(replay) - ages) % capacity
 
 

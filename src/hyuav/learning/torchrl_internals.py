@@ -46,6 +46,7 @@ class LearnerSACLoss(SACLoss):
         super().__init__(*networks, alpha_init=alpha_init, **options)
         # (N, 1) broadcasts against the log-probabilities (N, K) of a mini-batch.
         self.log_alpha = nn.Parameter(torch.full((learners, 1), math.log(alpha_init)))
+        _ = self.target_entropy  # a buffer that is otherwise made when it is first asked for
 
     def _compute_target_v2(self, tensordict: TensorDictBase) -> Tensor:
         """The target (N, K), as TorchRL's but for the temperatures, which multiply (N, K) here."""

@@ -20,7 +20,7 @@ from hyuav._support.randomness import (
     uniform,
 )
 from hyuav.envs.transforms import make_env
-from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
+from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, made_on
 from hyuav.learning.checkpoint import (
     begins_episode,
     below_infinity,
@@ -98,10 +98,10 @@ class Cohort:
             scenario, schemes, (len(seeds),), device, seeds, **parameters.environment
         )
         # Line 1: actor mu, critic Q, their targets and the replay buffer B.
-        with self.env.device:
+        with made_on(self.env.device):
             algorithm = parameters.build(len(seeds), scenario)
-        draw_weights(algorithm.loss, seeds, "weights")
-        self.algorithm = parameters.guided(algorithm, self.env, seeds)
+            draw_weights(algorithm.loss, seeds, "weights")
+            self.algorithm = parameters.guided(algorithm, self.env, seeds)
         for step in self.algorithm.steps:
             begin_moments(step.optimizer)
         self._streams = self._random_streams(seeds, batch_size)
@@ -121,7 +121,9 @@ class Cohort:
         self._collected = iter(self.collector)
         self._compiled: CompiledSlots | None = None
         self.episode = self.updates = 0
-        self.best_evaluation = torch.full((len(seeds),), -torch.inf, device=self.env.device)
+        self.best_evaluation = torch.full(
+            (len(seeds),), -torch.inf, dtype=torch.float32, device=self.env.device
+        )
         self.best_weights = copy_weights(self.algorithm.loss)
         self.stopped = torch.zeros(len(seeds), dtype=torch.int64, device=self.env.device)
 
@@ -156,7 +158,7 @@ class Cohort:
 
     def _fly_slots(self) -> FlownEpisode:
         """Lines 2 to 16, slot by slot."""
-        reward = torch.zeros(len(self.learners), device=self.env.device)
+        reward = torch.zeros_like(self.best_evaluation)
         unbroken = torch.ones_like(self.stopped, dtype=torch.bool)
         finite = torch.zeros_like(self.stopped)
         losses: list[dict[str, Tensor]] = []

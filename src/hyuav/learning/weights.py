@@ -37,7 +37,8 @@ def draw_weights(module: nn.Module, seeds: Sequence[int], stream: str) -> None:
         bound = networks[f"{layer}.weight"].shape[-2] ** -0.5
         for learner, generator in enumerate(generators):
             own = values.data.select(-3, learner)
-            drawn = torch.empty(own.shape, device=generator.device)  # alike on every device
+            # Alike on every device.
+            drawn = torch.empty(own.shape, dtype=own.dtype, device=generator.device)
             own.copy_(drawn.uniform_(-bound, bound, generator=generator))
     for name, target in module.named_buffers():
         if name.startswith("target_"):
@@ -79,7 +80,7 @@ def begin_moments(optimizer: torch.optim.Optimizer) -> None:
     for group in optimizer.param_groups:
         for weight in group["params"]:
             optimizer.state[weight] = {
-                "step": torch.zeros((), device=weight.device),
+                "step": torch.zeros((), dtype=torch.float32, device=weight.device),
                 "exp_avg": torch.zeros_like(weight),
                 "exp_avg_sq": torch.zeros_like(weight),
             }

@@ -1,7 +1,7 @@
 """Where the nodes are, and random UE layouts for studies beyond the two presets."""
 
 from collections.abc import Sequence
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import torch
 from pydantic import Field
@@ -115,8 +115,9 @@ def clusters(
     sizes, center = checked(Sizes, "sizes", sizes), checked(Point, "center", center)
     cluster_radius = checked(NonNegativeNumber, "cluster_radius", cluster_radius)
     spread = checked(NonNegativeNumber, "spread", spread)
-    turn = torch.rand((), generator=generator, dtype=torch.float64)
-    angles = 2 * torch.pi * (turn + torch.arange(len(sizes), dtype=torch.float64) / len(sizes))
+    exact: dict[str, Any] = {"dtype": torch.float64, "device": generator.device}
+    turn = torch.rand((), generator=generator, **exact)
+    angles = 2 * torch.pi * (turn + torch.arange(len(sizes), **exact) / len(sizes))
     positions: list[Point] = []
     for size, angle in zip(sizes, angles, strict=True):
         x = center[0] + spread * float(angle.cos())
@@ -143,14 +144,16 @@ def random_layout(seed: int) -> tuple[Point, ...]:
     if seed % 2 == 0:
         return disk(10, seed=seed)
     generator = torch.Generator().manual_seed(derived_seed(seed, "cluster sizes"))
-    first = int(torch.randint(3, 8, (), generator=generator))
+    first = int(torch.randint(3, 8, (), generator=generator, device=generator.device))
     return clusters([first, 10 - first], seed=seed)
 
 
 def _disk(
     num_ues: int, radius: float, center: Point, generator: torch.Generator
 ) -> tuple[Point, ...]:
-    draws = torch.rand((num_ues, 2), generator=generator, dtype=torch.float64)
+    draws = torch.rand(
+        (num_ues, 2), generator=generator, dtype=torch.float64, device=generator.device
+    )
     distance, angle = radius * draws[:, 0].sqrt(), 2 * torch.pi * draws[:, 1]
     x, y = center[0] + distance * angle.cos(), center[1] + distance * angle.sin()
     return tuple(zip(x.tolist(), y.tolist(), strict=True))

@@ -33,7 +33,7 @@ class ModeRule(NamedTuple):
         """The rules of these names, as :func:`fixed_modes` reads them: flags (len(names), 2^H)."""
         modes = mode_vectors(num_helpers)
         of_names = [allowed_vectors(name, num_helpers) for name in names]
-        allowed = torch.tensor([[mode in own for mode in modes] for own in of_names])
+        allowed = torch.tensor([[mode in own for mode in modes] for own in of_names], device="cpu")
         first = allowed & (allowed.cumsum(dim=-1) == 1)
         return cls(allowed.to(device), first.to(device))
 

@@ -49,4 +49,5 @@ def draw_tasks(
 def mean_tasks(scenario: Scenario, dtype: torch.dtype = torch.float32) -> Tasks:
     """Tasks (U,) of mean size and mean cycles per bit, for pictures that draw none."""
     ranges = (scenario.task_size, scenario.cycles_per_bit)
-    return Tasks(*(torch.full((scenario.num_ues,), sum(pair) / 2, dtype=dtype) for pair in ranges))
+    shape = (scenario.num_ues,)
+    return Tasks(*(torch.full(shape, sum(pair) / 2, dtype=dtype, device="cpu") for pair in ranges))

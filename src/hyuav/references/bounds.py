@@ -67,7 +67,7 @@ class CellBounds:
         room = MOST_RATES / (self._draws * len(self._powers) * ways)
         self._count = max(min(int(room ** (0.5 / ample.num_helpers)), MOST_CELLS), 2)
         self._side = ample.map_side / self._count
-        axis = (torch.arange(self._count, dtype=torch.float64) + 0.5) * self._side
+        axis = (torch.arange(self._count, dtype=torch.float64, device="cpu") + 0.5) * self._side
         axis -= ample.map_side / 2
         self._centers = torch.cartesian_prod(axis, axis)
         self._rewards: dict[str, Values] = {}
@@ -106,7 +106,7 @@ class CellBounds:
         """The bound of the expected reward for all cells of all helpers: (X, Y, X', Y', ...)."""
         num_helpers = len(self._helpers)
         vectors = allowed_vectors(mode_rule, num_helpers)
-        own = torch.arange(len(self._centers))
+        own = torch.arange(len(self._centers), device="cpu")
         cells = torch.cartesian_prod(*[own] * num_helpers).reshape(-1, num_helpers)
         bounds = []
         for part in cells.split(max(_CHUNK // self._draws, 1)):
@@ -147,7 +147,7 @@ def _bound(
     scenario, standing = physics.scenario, physics.standing(physics.nodes)
     cells, (least, most) = centers.unsqueeze(1), power
     nearest, farthest = _span(cells.unsqueeze(-2), standing.positions, side / 2)
-    relaying = torch.tensor(relays).unsqueeze(-1)
+    relaying = torch.tensor(relays, device="cpu").unsqueeze(-1)
     to_ues, near_l, near_e = physics.by_role(nearest)
     _, far_l, far_e = physics.by_role(farthest)
     climb = scenario.altitude - scenario.eavesdropper_altitude

@@ -38,7 +38,7 @@ class FlightPolicy(TensorDictModuleBase):
         self.step_length = scenario.max_speed * scenario.slot_duration
         self.register_buffer("power", None)
         if scenario.power_control:
-            share = torch.ones(len(path) - 1, path.shape[1]) if power is None else power
+            share = torch.ones_like(path[1:, :, 0]) if power is None else power
             decibels = 10.0 * share.to(torch.float64).log10()
             self.power = (1.0 + 2.0 * decibels / scenario.power_range).unsqueeze(-1)
 

@@ -88,7 +88,7 @@ class SeveralHelpers:
         for jammers in range(scenario.num_helpers + 1):
             ends = [*jamming[:jammers], *[relay] * (scenario.num_helpers - jammers)]
             path = _straight(self._physics, ends, num_slots)
-            yield path, torch.ones(num_slots, scenario.num_helpers, dtype=path.dtype)
+            yield path, path.new_ones(num_slots, scenario.num_helpers)
 
     def _joint_plan(self, mode_rule: str, num_slots: int) -> Plan:
         """The best flight of two helpers on a coarse grid."""
@@ -125,10 +125,10 @@ class SeveralHelpers:
             [one.unsqueeze(1).expand(*size, 2), other.expand(*size, 2)], dim=-2
         ).flatten(0, 1)
         levels = levels_of(self._physics.scenario, COARSE_LEVELS).tolist()
-        best = torch.full((len(pairs),), -torch.inf, dtype=pairs.dtype)
-        power = torch.ones(len(pairs), 2, dtype=pairs.dtype)
+        best = pairs.new_full((len(pairs),), -torch.inf)
+        power = pairs.new_ones(len(pairs), 2)
         for both in product(levels, repeat=2):
-            own = torch.tensor(both, dtype=pairs.dtype).expand_as(power)
+            own = pairs.new_tensor(both).expand_as(power)
             reward = self._quiet([mode_rule], pairs, own)[0]
             better = (reward > best).unsqueeze(-1)
             power, best = torch.where(better, own, power), torch.maximum(best, reward)
@@ -165,7 +165,7 @@ class SeveralHelpers:
             found, level = best_levels(
                 expected, self._quiet, [mode_rule], candidates, others, helper, self._step
             )
-            reward, share = torch.full((2, len(positions)), -torch.inf, dtype=path.dtype)
+            reward, share = path.new_full((2, len(positions)), -torch.inf)
             reward[near], share[near] = found[0], level[0]
             rewards.append(reward.reshape(grid.shape).numpy())
             levels.append(share.reshape(grid.shape))
@@ -180,9 +180,9 @@ class SeveralHelpers:
 def _straight(physics: Physics, destinations: Sequence[Point], num_slots: int) -> Tensor:
     """Straight flights, as fast as half the speed limit, and then hovering: (T + 1, H, 2) m."""
     scenario, starts = physics.scenario, physics.nodes.helper
-    way = torch.tensor(destinations, dtype=starts.dtype) - starts
+    way = starts.new_tensor(destinations) - starts
     step = scenario.max_speed * scenario.slot_duration / 2
-    slots = torch.arange(num_slots + 1, dtype=starts.dtype).reshape(-1, 1, 1)
+    slots = torch.arange(num_slots + 1, dtype=starts.dtype, device=starts.device).reshape(-1, 1, 1)
     length = torch.linalg.vector_norm(way, dim=-1, keepdim=True).clamp(min=1e-9)
     return starts + way * (slots * step / length).clamp(max=1.0)
 

@@ -179,7 +179,7 @@ def solve_horizons(
     evaluation_draws = checked(_Draws, "evaluation_draws", evaluation_draws)
     require_resolution(resolution, scenario.map_side, longest)
     root = torch.Generator().manual_seed(as_seed(seed))
-    map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root).tolist()
+    map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root, device="cpu").tolist()
 
     physics = Physics(scenario, dtype=torch.float64)
     one = scenario.num_helpers == 1
@@ -265,7 +265,7 @@ class _OneHelper:
         quiet = ExpectedReward(physics, 1, torch.Generator().manual_seed(seed))
         self._grid = grid_over_map(physics.scenario, resolution)
         places = self._grid.positions().unsqueeze(1)
-        nominal = torch.ones(len(places), 1, dtype=places.dtype)
+        nominal = places.new_ones(len(places), 1)
         rewards, shares = best_levels(expected, quiet, mode_rules, places, nominal, 0, power_step)
         self._maps: dict[str, tuple[list[Values], list[Values], Reach, Tensor]] = {}
         for mode_rule, reward, share in zip(mode_rules, rewards, shares, strict=True):
@@ -285,5 +285,5 @@ class _OneHelper:
 
 
 def _nominal(scenario: Scenario, modes: Tensor) -> Tensor:
-    powers = torch.tensor([scenario.jamming_power, scenario.relay_power], dtype=torch.float64)
-    return powers[modes]
+    powers = scenario.jamming_power, scenario.relay_power
+    return torch.tensor(powers, dtype=torch.float64, device=modes.device)[modes]

@@ -20,9 +20,9 @@ def levels_of(scenario: Scenario, step: float) -> Tensor:
         step: between two levels in dB.
     """
     if not scenario.power_control:
-        return torch.ones(1, dtype=torch.float64)
+        return torch.ones(1, dtype=torch.float64, device="cpu")
     count = int(scenario.power_range / step * (1 + 1e-9)) + 1
-    return 10.0 ** (torch.arange(count, dtype=torch.float64) * (-step / 10.0))
+    return 10.0 ** (torch.arange(count, dtype=torch.float64, device="cpu") * (-step / 10.0))
 
 
 def best_levels(
@@ -55,11 +55,11 @@ def best_levels(
         rewards = expected(mode_rules, places, None if bool((power == 1).all()) else power)
         return rewards, torch.ones_like(rewards)
     power = power.clone()
-    best, index = torch.empty(2, len(mode_rules), len(places), dtype=places.dtype)
+    best, index = places.new_empty(2, len(mode_rules), len(places))
     best.fill_(-torch.inf)
     for number, level in enumerate(levels):
         power[:, helper] = level
-        _keep(best, index, quiet(mode_rules, places, power), torch.tensor(float(number)))
+        _keep(best, index, quiet(mode_rules, places, power), places.new_tensor(number))
     if expected is quiet:
         return best, levels[index.long()]
     near = max(round(NEAR / step), 1)

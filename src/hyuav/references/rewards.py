@@ -45,7 +45,7 @@ class ExpectedReward:
             power: (P, H), in units of the nominal power; None for that.
         """
         scenario = self.physics.scenario
-        means = torch.empty(len(mode_rules), len(places), dtype=places.dtype)
+        means = torch.empty(len(mode_rules), len(places), dtype=places.dtype, device=places.device)
         several = 4 ** (scenario.num_helpers - 1)
         chunk = max(_CHUNK // (self._draws * scenario.num_ues * several), 1)
         parts = places.split(chunk)
@@ -90,7 +90,7 @@ def estimate_return(
     draws = draws if is_random(physics) else 1
     vectors = allowed_vectors(mode_rule, scenario.num_helpers)
     chunk = max(_CHUNK // (num_slots * scenario.num_ues), 1)
-    total = torch.zeros(len(vectors), num_slots, dtype=path.dtype)
+    total = torch.zeros(len(vectors), num_slots, dtype=path.dtype, device=path.device)
     returns = []
     for first in range(0, draws, chunk):
         shape = (min(chunk, draws - first), num_slots)
@@ -102,10 +102,9 @@ def estimate_return(
         returns.append(sums.amax(dim=0).sum(dim=-1))
     episodes = torch.cat(returns)
     error = float(episodes.std()) / math.sqrt(draws) if draws > 1 else 0.0
-    modes = torch.tensor(vectors, dtype=torch.int64)[
-        total.max(dim=0).indices
-    ]  # of equals the first
-    return float(episodes.mean()), error, modes
+    best = total.max(dim=0).indices  # of equals the first
+    modes = torch.tensor(vectors, dtype=torch.int64, device=path.device)
+    return float(episodes.mean()), error, modes[best]
 
 
 def rewards_of(
@@ -183,5 +182,7 @@ def stratified_fading(physics: Physics, draws: int, generator: torch.Generator) 
         return None
     links = fading.shape[-1]
     strata = fading.reshape(-1, links).sort(dim=0).values.reshape(draws, _STRATUM, links)
-    shuffled = torch.rand((draws, links), generator=generator).argsort(dim=0)
+    shuffled = torch.rand(
+        (draws, links), generator=generator, dtype=torch.float32, device=generator.device
+    ).argsort(dim=0)
     return physics.link_row.unflatten(strata.mean(dim=1).gather(0, shuffled))

@@ -66,7 +66,7 @@ class ConstantVelocity(TensorDictModuleBase):
                     )
             nominal_power = [1.0] * (scenario.action_size - 2)
             action += [component / scenario.max_speed for component in velocity] + nominal_power
-        self.register_buffer("action", torch.tensor(action))
+        self.register_buffer("action", torch.tensor(action, dtype=torch.float32, device="cpu"))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the same action for every flight of the batch."""

@@ -91,7 +91,8 @@ def _begin() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_parent, daemon=True).start()
     # TorchRL's replay has locks. Those of "spawn" have names, which are left if it is killed.
-    multiprocessing.set_start_method("fork", force=True)
+    if "fork" in multiprocessing.get_all_start_methods():
+        multiprocessing.set_start_method("fork", force=True)
     settle()
 
 

@@ -82,7 +82,8 @@ class Imitation:
             behind = self._flights.behind.unsqueeze(-1)
             chosen = torch.where(behind.unsqueeze(-1), others[:, 1], chosen)
             better = better | behind
-        return self._weight * better * (action - chosen).square().sum(dim=-1)
+        distance = (action - chosen).square().sum(dim=-1)
+        return self._weight * better.to(distance.dtype) * distance
 
     @torch.no_grad()
     def _rate(self, weights: TensorDictParams, observation: Tensor, actions: Tensor) -> Tensor:

@@ -53,9 +53,8 @@ class Planner(Guidance):
         self._env, self._seeds = env, seeds
         learners, self._scenario = len(seeds), env.base_env.scenario
         self._layout = ObservationLayout(self._scenario, clock=algorithm.clock)
-        with env.device:
-            self.flights = Demonstrations(learners, self._scenario, guide.return_margin)
-            self.reward_model = self._make_reward_model() if guide.control_variate else None
+        self.flights = Demonstrations(learners, self._scenario, guide.return_margin)
+        self.reward_model = self._make_reward_model() if guide.control_variate else None
         if self.reward_model is not None:
             draw_weights(self.reward_model, seeds, "control variate")
         physics, schemes = env.base_env.physics, env.base_env.schemes

@@ -99,7 +99,8 @@ class RewardModel(nn.Module):
         diagonal = products.diagonal(dim1=1, dim2=2)
         least = self._guide.least_noise * diagonal.mean(dim=1).reshape(-1, 1, 1)
         prior = self.noise.double().maximum(least)
-        equations = products + prior * torch.eye(self.size, device=products.device)
+        identity = torch.eye(self.size, dtype=products.dtype, device=products.device)
+        equations = products + prior * identity
         root, failed = torch.linalg.cholesky_ex(equations)
         mean = torch.cholesky_solve(torch.bmm(transposed, adjusted).double(), root)
         deviation = torch.linalg.solve_triangular(

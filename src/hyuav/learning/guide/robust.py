@@ -43,9 +43,7 @@ class Robust(AlgorithmParameters):
         """See :meth:`AlgorithmParameters.guided`."""
         if self.guide is None:
             return algorithm
-        planner = Planner(self.guide, self, env, seeds)
-        with env.device:
-            return planner.attach(algorithm)
+        return Planner(self.guide, self, env, seeds).attach(algorithm)
 
     def least_replay(self, num_slots: int) -> int:
         """See :meth:`AlgorithmParameters.least_replay`: a flight, to keep the best."""

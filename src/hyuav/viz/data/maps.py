@@ -48,7 +48,7 @@ def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
         resolution: of the map in m.
     """
     half = scenario.map_side / 2
-    axis = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64)
+    axis = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64, device="cpu")
     y, x = torch.meshgrid(axis, axis, indexing="ij")
     physics = Physics(scenario, dtype=torch.float64)
     positions = torch.stack([x, y], dim=-1).unsqueeze(-2)

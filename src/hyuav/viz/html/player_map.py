@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from hyuav.envs.rendering import (
@@ -16,6 +15,7 @@ from hyuav.envs.rendering import (
     runs_of_one_mode,
 )
 from hyuav.physics.channel import horizontal_distance
+from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import covered
 from hyuav.physics.scenario import Point, Scenario
 from hyuav.viz.data.flights import Flight
@@ -145,9 +145,9 @@ def _ues(scenario: Scenario, flight: Flight, slot: int, helper: Point) -> list[T
 
 def _coverage(scenario: Scenario, helper: Point) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which UEs eq. 5 lets jam, and which it lets relay, were the helper there: (U,) each."""
-    ues, radius = torch.tensor(scenario.ue_positions), scenario.coverage_radius
-    to_legitimate = horizontal_distance(ues, torch.tensor(scenario.legitimate_position))
-    to_helper = horizontal_distance(ues, torch.tensor(helper))
+    nodes, radius = Nodes.of(scenario, "cpu"), scenario.coverage_radius
+    to_legitimate = horizontal_distance(nodes.ue, nodes.legitimate)
+    to_helper = horizontal_distance(nodes.ue, nodes.legitimate.new_tensor(helper))
     return covered(to_legitimate, radius).numpy(), covered(to_helper, radius).numpy()
 
 
