@@ -13,7 +13,7 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.envs import TransformedEnv
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
-from hyuav.envs.rendering import FlightRecorder
+from hyuav.envs.recorder import FlightRecorder
 from hyuav.physics.scenario import Scenario
 
 Floats = NDArray[np.float32]
@@ -39,7 +39,8 @@ class Flights:
         self.env = env
         self._state: TensorDictBase | None = None
         self.scenario: Scenario = env.base_env.scenario
-        self._recorder = None if render_mode is None else FlightRecorder(self.scenario)
+        if render_mode is not None:  # of every row, not of the first alone
+            env.base_env.recorder = FlightRecorder(env.numel(), self.scenario.num_slots)
 
     @property
     def state(self) -> TensorDictBase:
@@ -75,9 +76,7 @@ class Flights:
             entries = self.state.copy()
             entries["position"] = torch.where(rows.unsqueeze(-1), start, entries["position"])
             entries["_reset"] = rows
-            if self._recorder is not None:
-                self._recorder.drop_last()
-        self._enter(self.env.reset(entries))
+        self._state = self.env.reset(entries)
 
     def step(self, action: ArrayLike) -> tuple[Floats, Floats, Flags]:
         """Fly one slot by ``action`` (*B, 2): reward, secrecy sum-rate and truncation, (*B,)."""
@@ -87,7 +86,7 @@ class Flights:
         flown = self.env.step(state)
         after = flown["next"]
         sum_rate = after["reward"] + self.scenario.off_map_penalty * after["off_map"]
-        self._enter(self.env.step_mdp(flown))
+        self._state = self.env.step_mdp(flown)
         return _column(after["reward"]), _column(sum_rate), _column(after["truncated"])
 
     def observation(self) -> Floats:
@@ -104,15 +103,10 @@ class Flights:
             "secrecy_sum_rate": secrecy_sum_rate,
         }
 
-    def frame(self, row: tuple[int, ...] = ()) -> NDArray[np.uint8]:
-        """A picture of one row's flight up to now; needs a render mode."""
-        assert self._recorder is not None
-        return self._recorder.frame(int(self.state["step_count"][row]), row)
-
-    def _enter(self, state: TensorDictBase) -> None:
-        self._state = state
-        if self._recorder is not None:
-            self._recorder.add(self._position(), _column(state["mode"]))
+    def frame(self, row: int = 0) -> NDArray[np.uint8]:
+        """A picture of one row's flight up to now; only the first has one without a render mode."""
+        picture: NDArray[np.uint8] = self.env.base_env.render(row)
+        return picture
 
     def _position(self) -> Floats:
         """Where the helper is: (*B, 2) m."""

@@ -193,7 +193,7 @@ class SecureOffloadingVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         """Each row's map and flight up to now; None without a render mode."""
         if self.render_mode is None:
             return None
-        return tuple(self._flights.frame((row,)) for row in range(self.num_envs))
+        return tuple(self._flights.frame(row) for row in range(self.num_envs))
 
     def _checked_mask(self, mask: ArrayLike) -> Flags:
         rows = np.asarray(mask)
