@@ -38,8 +38,14 @@ def both_flights(scenario: Scenario, **options: Any) -> tuple[TensorDictBase, Te
             flown = env.step(state.set("action", action))
             slots.append(flown["next"])
             state = env.step_mdp(flown)
+        positions, modes, count = env.base_env.recorder.flight(0)
+        first = [slot.flatten()[0] for slot in slots]
+        assert count == len(actions)
+        assert positions[1:].tolist() == [slot["position"][0].tolist() for slot in first]
+        assert modes[1:].tolist() == [slot["mode"].item() for slot in first]
         # Once compiled, a reset is another way through the same graph.
         anew = env.reset()
+        assert env.base_env.recorder.flight(0)[2] == 0
         assert_equal_up_to_rounding(anew, resets.setdefault("eager", anew))
         flights.append(torch.stack(slots))
     assert not envs[1]._eager
@@ -100,6 +106,11 @@ def test_actions_are_read_as_they_are_and_seeds_may_change_their_kind() -> None:
         for compiled in (False, True)
     )
     actions = torch.rand(64, 2, dtype=torch.float64) * 2 - 1
+    first, second = (env.step(env.reset().set("action", actions))["next"] for env in (eager, fast))
+    torch.testing.assert_close(second["reward"], first["reward"], rtol=2e-5, atol=1e-4)
+    for env in (eager, fast):
+        env.set_seed([*range(1, 65)], static_seed=True)
+    assert fast._flight is not None
     first, second = (env.step(env.reset().set("action", actions))["next"] for env in (eager, fast))
     torch.testing.assert_close(second["reward"], first["reward"], rtol=2e-5, atol=1e-4)
     for env in (eager, fast):

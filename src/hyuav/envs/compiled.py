@@ -38,7 +38,9 @@ class CompiledEnv(TransformedEnv):
             self._compile(tensordict)
         if self._flight is None or not {"next", "_step"}.isdisjoint(tensordict.keys()):
             return super()._step(tensordict)
-        return self._flown(self._flight, tensordict)
+        after = self._flown(self._flight, tensordict)
+        self.base_env.recorder.add(after["position"], after["mode"])
+        return after
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         partly = tensordict is not None and tensordict.get("_reset", None) is not None
@@ -54,13 +56,16 @@ class CompiledEnv(TransformedEnv):
         after["episode_reward"] = before["episode_reward"]
         if self.base_env.diagnostics:
             after["diagnostics"] = self.base_env.observation_spec["diagnostics"].zero()
+        self.base_env.recorder.start(after["position"], after["mode"])
         return after
 
-    def set_seed(self, seed: int | None = None, static_seed: bool = False) -> int | None:
-        """Draw from one seed for all rows; a graph that draws from one for each is then dropped."""
-        if self.base_env.draws.rows is not None:
+    def set_seed(self, seed: Any = None, static_seed: bool = False) -> Any:
+        """Draw from another seed; a graph is dropped if other rows then have a seed in common."""
+        before = self.base_env.draws.rows
+        following = super().set_seed(seed, static_seed)
+        after = self.base_env.draws.rows
+        if (before is None) != (after is None) or not (before is None or before.equal(after)):
             self._flight = None
-        following: int | None = super().set_seed(seed, static_seed)
         return following
 
     def _flown(self, flight: Flight, tensordict: TensorDictBase) -> TensorDictBase:

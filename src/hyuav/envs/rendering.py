@@ -1,17 +1,17 @@
 """Maps of a scenario and of the flights over it, drawn with matplotlib."""
 
-from collections import deque
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
@@ -128,19 +128,34 @@ def mode_handles(color: str = "0.3") -> list[Line2D]:
     ]
 
 
-def render_frame(scenario: Scenario, positions: ArrayLike, modes: ArrayLike) -> NDArray[np.uint8]:
+def _frame_handles() -> list[Artist]:
+    """The legend's samples of what a frame shows besides the nodes."""
+    ends = _DOTS_ONLY | {"color": HELPER_COLOR}
+    return [
+        Patch(facecolor=("0.5", 0.08), edgecolor=("0.5", 0.7), label="coverage"),
+        Line2D([], [], **ends, marker="D", markersize=_size(1.3), label="start"),
+        Line2D([], [], **ends, marker="*", markersize=_size(2.6), label="latest slot"),
+        *mode_handles(HELPER_COLOR),
+    ]
+
+
+def render_frame(
+    scenario: Scenario, positions: ArrayLike, modes: ArrayLike, slots_flown: int | None = None
+) -> NDArray[np.uint8]:
     """Draw a flight up to now, with the coverage of this slot, as a picture.
 
     Args:
         scenario: that is flown.
         positions: (t + 1, 2) m, the start and then the position in each slot up to now.
         modes: (t + 1,) 1 relay, 0 jamming, at the start and of each slot.
+        slots_flown: since the start, where more than the last t; None for t.
 
     Returns:
         (height, width, 3) red, green and blue.
     """
     path, relays = np.asarray(positions, dtype=float), np.asarray(modes).astype(bool)
-    helper, slot = (float(path[-1, 0]), float(path[-1, 1])), len(path) - 1
+    helper = (float(path[-1, 0]), float(path[-1, 1]))
+    slot = len(path) - 1 if slots_flown is None else slots_flown
     figure = Figure(figsize=_FRAME_INCHES, dpi=_FRAME_DPI)
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes(_FRAME_MAP)  # fixed, so that the map keeps still from frame to frame
@@ -151,7 +166,7 @@ def render_frame(scenario: Scenario, positions: ArrayLike, modes: ArrayLike) -> 
     axes.set_title(f"slot {slot} of {scenario.num_slots}, {'relay' if relays[-1] else 'jamming'}")
     nodes, _ = axes.get_legend_handles_labels()
     figure.legend(
-        handles=[*nodes, *mode_handles(HELPER_COLOR)],
+        handles=[*nodes, *_frame_handles()],
         loc="upper left",
         bbox_to_anchor=_FRAME_LEGEND,
         frameon=False,
@@ -159,32 +174,6 @@ def render_frame(scenario: Scenario, positions: ArrayLike, modes: ArrayLike) -> 
     )
     pixels, (width, height) = canvas.print_to_buffer()  # type: ignore[no-untyped-call]
     return np.frombuffer(pixels, np.uint8).reshape(height, width, 4)[..., :3].copy()
-
-
-class FlightRecorder:
-    """The latest slots of a batch of flights, as far back as an episode can reach.
-
-    Args:
-        scenario: that is flown.
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        self.scenario = scenario
-        self._slots: deque[tuple[NDArray[Any], NDArray[Any]]] = deque(maxlen=scenario.num_slots + 1)
-
-    def add(self, position: NDArray[Any], mode: NDArray[Any]) -> None:
-        """Add one slot, or a start: ``position`` (*B, 2) m and ``mode`` (*B,)."""
-        self._slots.append((position.copy(), mode.copy()))
-
-    def drop_last(self) -> None:
-        """Take the last slot back, to :meth:`add` it again with some rows started anew."""
-        self._slots.pop()
-
-    def frame(self, slots_flown: int, row: tuple[int, ...]) -> NDArray[np.uint8]:
-        """What :func:`render_frame` draws of one row's flight, which is ``slots_flown`` long."""
-        slots = list(self._slots)[-1 - slots_flown :]
-        path, modes = ([entry[row] for entry in entries] for entries in zip(*slots, strict=True))
-        return render_frame(self.scenario, path, modes)
 
 
 def _covered(scenario: Scenario, helper: Point, *, relay: bool) -> NDArray[np.bool_]:

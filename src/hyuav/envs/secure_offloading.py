@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
@@ -22,6 +24,7 @@ from hyuav.envs.arguments import (
 )
 from hyuav.envs.diagnostics import diagnose, diagnostics_spec
 from hyuav.envs.draws import Draws
+from hyuav.envs.recorder import FlightRecorder
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import ModeRule
 from hyuav.physics.scenario import Scenario
@@ -112,11 +115,10 @@ class SecureOffloadingEnv(EnvBase):
         if norm_limit is not None:
             self._norm_limit = self._per_row(norm_limit).unsqueeze(-1)
         self._make_specs()
+        self.recorder = FlightRecorder(1, self.scenario.num_slots)
+        """Of the flights that :meth:`render` draws."""
         self.draws: Draws
-        if isinstance(seed, list | tuple):
-            self.draws = Draws(self.physics, self.batch_size, as_seeds(seed, self.batch_size))
-        else:
-            self.set_seed(as_seed(seed))
+        self._set_seed(seed)
 
     def _layout(self) -> Nodes:
         """Where the nodes are before the first slot, in each row where the rows differ."""
@@ -180,8 +182,27 @@ class SecureOffloadingEnv(EnvBase):
         self.reward_spec = numbers(1)
         self.done_spec = Composite(done=flags(1), terminated=flags(1), shape=batch, device=device)
 
-    def _set_seed(self, seed: int | None) -> None:
-        self.draws = Draws(self.physics, self.batch_size, as_seed(seed))
+    def _set_seed(self, seed: int | list[int] | tuple[int, ...] | None) -> None:
+        if isinstance(seed, list | tuple):
+            own: int | tuple[int, ...] = as_seeds(seed, self.batch_size)
+        else:
+            own = as_seed(seed)
+        self.draws = Draws(self.physics, self.batch_size, own)
+
+    def render(self, row: int = 0) -> NDArray[np.uint8]:
+        """Draw the map and the flight since the last reset, (height, width, 3).
+
+        Args:
+            row: of the batch; only the first is kept, unless :attr:`recorder` keeps more.
+
+        Raises:
+            InputError: there was no reset yet.
+        """
+        from hyuav.envs.rendering import render_frame  # with matplotlib, which takes its time
+
+        alike = len(self.scenarios) == 1
+        own = self.scenario if alike else self.scenarios[row // self.batch_size[1:].numel()]
+        return render_frame(own, *self.recorder.flight(row))
 
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
         position = self.start(tensordict)
@@ -190,6 +211,8 @@ class SecureOffloadingEnv(EnvBase):
         after_reset = self._slot(position, staying)[0]
         if self.diagnostics:
             after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
+        chosen = None if tensordict is None else tensordict.get("_reset", None)
+        self.recorder.start(after_reset["position"], after_reset["mode"], chosen)
         return after_reset
 
     def start(self, tensordict: TensorDictBase | None) -> Tensor:
@@ -223,6 +246,8 @@ class SecureOffloadingEnv(EnvBase):
             assert tasks is not None
             edge_load = tensordict["diagnostics", "edge_load"]
             after["diagnostics"] = diagnose(self.scenario, outcome, tasks, edge_load)
+        if isinstance(self.draws, Draws):  # else a graph is recorded, and nothing is flown
+            self.recorder.add(after["position"], after["mode"])
         return after
 
     def _slot(
