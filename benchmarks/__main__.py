@@ -25,7 +25,7 @@ from hyuav._support.files import require_writable
 from hyuav._support.machine import cores
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
-from hyuav.experiments.run_directory import named_scenario
+from hyuav.experiments.scenarios import named_scenario
 
 
 @recipe(

@@ -4,6 +4,8 @@ hyuav copy algorithm1
 python algorithm1.py
 """
 
+import logging
+
 import torch
 from tensordict.nn import TensorDictModule, TensorDictSequential
 from torch import nn
@@ -94,4 +96,5 @@ def train(
 
 
 if __name__ == "__main__":
+    logging.getLogger("torchrl").setLevel(logging.WARNING)  # or it would tell of its storage
     train()

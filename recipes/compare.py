@@ -35,11 +35,10 @@ from hyuav.viz.paper.comparison import draw
 @recipe(
     "compare",
     Compare,
-    groups={},
+    groups={"logger": "none"},
     sections={
         "training": partial(TrainingParameters, num_episodes=600, evaluation_every=5),
         "evaluation": EvaluationParameters,
-        "logger": partial(LoggerParameters, mode="disabled"),
     },
     run_directory="${output}",
 )

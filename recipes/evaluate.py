@@ -3,14 +3,16 @@
 hyuav evaluate run=runs/NAME
 hyuav evaluate run=[runs/HYBRID,runs/RELAY,runs/JAMMING]
 hyuav evaluate run=runs/NAME num_slots=10
+hyuav evaluate run=runs/NAME scenario=random_disk
+hyuav evaluate run=runs/SWEEP scenario.num_slots=10 scenario.jamming_power=0.2
 """
 
 import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
 
 # isort: split
 
-import dataclasses
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import torch
@@ -29,7 +31,8 @@ from hyuav._support.parameters import (
     parameter,
 )
 from hyuav._support.terminal import make_progress, print_line
-from hyuav.experiments.configuration import Config, recipe, section
+from hyuav.experiments.configuration import Config, given, recipe, section
+from hyuav.experiments.elsewhere import AS_TRAINED, destination, runs_in
 from hyuav.experiments.evaluation import (
     EVALUATION_FILE,
     FLIGHTS_FILE,
@@ -50,9 +53,13 @@ class Evaluate(Parameters):
     """What to evaluate and where to."""
 
     run: OneOrMore[Text] | None = parameter(None)
+    """Directories of runs; that of a sweep or of a comparison stands for the runs in it."""
     num_slots: Count | None = parameter(None, symbol="T")
-    """The horizon, of whose learners the runs must have some; the scenario's where it is None."""
+    """The horizon that the learners were trained for; None for their scenario's where some were, or
+    else for the longest."""
     output: Text | None = parameter(None)
+    """Directory for what comes of it; None for the run's, and in it one for each further horizon
+    and for each other scenario."""
     algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
     """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
     device: Text = parameter("cpu")
@@ -62,31 +69,33 @@ class Evaluate(Parameters):
 @recipe(
     "evaluate",
     Evaluate,
-    groups={},
-    sections={"evaluation": EvaluationParameters, "logger": EvaluationLoggerParameters},
+    groups={"scenario": AS_TRAINED, "logger": AS_TRAINED},
+    sections={"evaluation": EvaluationParameters},
     run_directory=".",
 )
 def main(config: Config, _: Path) -> None:
-    """Evaluate, print the table, and keep it beside the first run's other files."""
+    """Evaluate, print the table, and keep it in the first run's directory."""
     options = section(config, Evaluate)
     parameters = EvaluationParameters.from_dict(config["evaluation"])
     logger = EvaluationLoggerParameters.from_dict(config["logger"])
     if options.run is None:
         raise InputError("run is missing: expected run=DIRECTORY, or run=[DIRECTORY,...]")
     torch.set_num_threads(options.threads)
-    runs = [RunDirectory(path) for path in options.run]
-    first = runs[0].configuration()
-    if len({os.path.realpath(path) for path in options.run}) < len(runs):
+    runs = [run for path in options.run for run in runs_in(path)]
+    if len({os.path.realpath(run.path) for run in runs}) < len(runs):
         raise InputError(rejection("run", list(options.run), "different run directories"))
-    for run in runs[1:]:
-        if run.configuration().scenario != first.scenario:
-            raise InputError(rejection("run", str(run.path), f"the scenario of {runs[0].path}"))
-    scenario = first.scenario
-    if options.num_slots is not None:
-        scenario = dataclasses.replace(scenario, num_slots=options.num_slots)
-    console = Console()
-    output = runs[0].path if options.output is None else Path(options.output)
-    learned = learned_policies(runs, scenario)
+    flown = destination(
+        runs,
+        config["scenario"],
+        options.num_slots,
+        keeps_horizon="scenario.num_slots" not in given(),
+    )
+    console, scenario = Console(), flown.scenario
+    learned = learned_policies(runs, scenario, num_slots=flown.num_slots)
+    tell_who_flies(runs, flown.num_slots, console)
+    first = Path(options.run[0])
+    beside = first if runs[0].path == first else first / "evaluation"
+    output = Path(options.output or flown.directory(RunDirectory(beside)))
     require_writable("output", output / "figures")
     for name in (EVALUATION_FILE, FLIGHTS_FILE):
         if (output / name).is_dir():
@@ -95,7 +104,7 @@ def main(config: Config, _: Path) -> None:
     with make_progress(console, "evaluating") as progress:
         evaluation = evaluate(
             scenario,
-            first.scenario_name,
+            flown.name,
             policies,
             parameters,
             options.device,
@@ -108,6 +117,21 @@ def main(config: Config, _: Path) -> None:
     log_evaluation(output, evaluation, runs, logger, console)
     print_line(f"evaluation: {output}", console)
     print_line(f"its report: {report.name}", console)
+
+
+def tell_who_flies(runs: Sequence[RunDirectory], num_slots: int, console: Console) -> None:
+    """Say what of several runs is left out, and which algorithms count as one scheme."""
+    configurations = {run.path: run.configuration() for run in runs}
+    fly = {
+        path: own.algorithm_name
+        for path, own in configurations.items()
+        if num_slots in own.horizons
+    }
+    left_out = [str(path) for path in configurations if path not in fly]
+    if left_out:
+        print_line(f"without learners for T = {num_slots}: {', '.join(left_out)}", console)
+    if len(algorithms := sorted(set(fly.values()))) > 1:
+        print_line(f"learners of {', '.join(algorithms)} count together", console)
 
 
 if __name__ == "__main__":

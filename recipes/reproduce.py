@@ -39,6 +39,7 @@ from hyuav._support.parameters import (
 )
 from hyuav._support.terminal import make_progress, print_line
 from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
+from hyuav.experiments.elsewhere import horizon_directory
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
 from hyuav.experiments.evaluation_table import print_results
 from hyuav.experiments.initial_weights import select_initial_weights
@@ -53,7 +54,7 @@ from hyuav.learning.training import TrainingParameters
 from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Preset, Scenario
 from hyuav.references.optimum import require_resolution
-from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
+from hyuav.viz.data.runs import AS_IN_PAPER
 from hyuav.viz.html.page import write_report
 from hyuav.viz.paper.gallery import FigureName, draw
 
@@ -84,12 +85,8 @@ class Reproduce(Parameters):
 @recipe(
     "reproduce",
     Reproduce,
-    groups={"scenario": "two_clusters", "algorithm": "ddpg_robust"},
-    sections={
-        "training": TrainingParameters,
-        "evaluation": EvaluationParameters,
-        "logger": LoggerParameters,
-    },
+    groups={"scenario": "two_clusters", "algorithm": "ddpg_robust", "logger": "wandb"},
+    sections={"training": TrainingParameters, "evaluation": EvaluationParameters},
     run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_reproduce_${hydra.runtime.choices.scenario}",
 )
 def main(config: Config, directory: Path) -> None:

@@ -3,6 +3,7 @@
 hyuav train scenario=two_clusters scheme=hybrid algorithm=ddpg seed=0
 hyuav train scheme=[hybrid,relay,jamming] num_slots=[10,20] learners=10
 hyuav train resume=runs/NAME
+hyuav train resume=runs/NAME training.num_episodes=2000
 """
 
 import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
@@ -48,6 +49,9 @@ from hyuav.learning.training import TrainingParameters
 from hyuav.physics.offloading import ModeRuleName
 from hyuav.viz.html.page import write_report
 
+EPISODES = "training.num_episodes"
+"""What of a training may be changed when it goes on."""
+
 
 @dataclass(frozen=True)
 class Train(Parameters):
@@ -62,14 +66,14 @@ class Train(Parameters):
     threads: Threads = parameter(1)
     warm_start: Text | None = parameter(None)
     resume: Text | None = parameter(None)
-    """Directory of an interrupted training, with which to go on as it was configured."""
+    """Directory of a training with which to go on as it was configured, or for more episodes."""
 
 
 @recipe(
     "train",
     Train,
-    groups={"scenario": "two_clusters", "algorithm": "ddpg"},
-    sections={"training": TrainingParameters, "logger": LoggerParameters},
+    groups={"scenario": "two_clusters", "algorithm": "ddpg", "logger": "wandb"},
+    sections={"training": TrainingParameters},
     run_directory="runs/${now:%Y-%m-%d_%H-%M-%S}_${hydra.runtime.choices.scenario}"
     "_${hydra.runtime.choices.algorithm}_${seed}",
 )
@@ -105,16 +109,19 @@ def main(config: Config, directory: Path) -> None:
 
 
 def go_on(path: str, config: Config) -> None:
-    """Go on with a training as it was configured; the place to compute and to log may change.
+    """Go on with a training as it was configured, or for more episodes.
+
+    The place to compute and the logger may change.
 
     Raises:
-        InputError: there is none, or something else was asked for beside it.
+        InputError: there is none, or something was asked for that would change what is trained.
     """
     named = {"algorithm"} if is_reference(config["algorithm"]["name"]) else set()
-    for name in given() - {"resume", "device", "threads"} - named:
-        if name == "hydra.run.dir" or not name.startswith(("logger.", "hydra.")):
-            accepted = "nothing beside it but device=, threads= and logger.NAME="
-            raise InputError(f"{rejection('resume', path, accepted)}, not {name}")
+    for name in given() - {"resume", "device", "threads", EPISODES} - named:
+        if name == "hydra.run.dir" or not name.startswith(("logger", "hydra.")):
+            accepted = f"nothing beside it but device=, threads=, logger.NAME= and {EPISODES}="
+            hint = f"{override('warm_start', Path(path))} begins a new training with its weights"
+            raise InputError(f"{rejection('resume', path, accepted)}, not {name} ({hint})")
     asked = RunDirectory(path).request()
     kept = {"device", "threads", "logger"} & asked.keys() - given()
     begun = {**config, **{name: asked[name] for name in kept}}
@@ -123,8 +130,10 @@ def go_on(path: str, config: Config) -> None:
     logger = LoggerParameters.from_dict({**mapping("logger", begun["logger"]), **own})
     torch.set_num_threads(options.threads)
     console = Console()
-    with telling_how_to_go_on(override("resume", Path(path))):
-        run = resume(path, logger, console, device=options.device)
+    episodes = config["training"]["num_episodes"] if EPISODES in given() else None
+    longer = [] if episodes is None else [f"{EPISODES}={episodes}"]
+    with telling_how_to_go_on(override("resume", Path(path)), *longer):
+        run = resume(path, logger, console, device=options.device, num_episodes=episodes)
     tell(run, console)
 
 

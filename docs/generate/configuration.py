@@ -20,8 +20,10 @@ from pydantic.fields import FieldInfo
 
 from hyuav._support.parameters import OrOne, Parameters, declared
 from hyuav._support.parameters import accepted as words
+from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.registry import ALGORITHMS, BUILT_IN
 from hyuav.learning.train import Learner
+from hyuav.physics.families import LAYOUTS
 from hyuav.physics.scenario import PRESETS, Scenario
 
 RECIPES = Path(__file__).parents[2] / "recipes"
@@ -37,8 +39,8 @@ def recipes_page() -> str:
         "directory to be edited, and `python train.py` then takes the same words. "
         "Anything below can be set by `name=value`, in a section or group by "
         "`section.name=value`; `--cfg job` prints it all, and "
-        "`--config-dir DIR` adds files of your own. The groups `scenario` and `algorithm` are "
-        "chosen by a name and changed field by field: "
+        "`--config-dir DIR` adds files of your own. The groups `scenario`, `algorithm` and "
+        "`logger` are chosen by a name and changed field by field: "
         "[their fields](configuration.md).",
     ]
     for path in sorted(RECIPES.glob("*.py")):
@@ -57,11 +59,23 @@ def configuration_page() -> str:
         f"{names}.",
         table(Scenario),
     ]
+    for layout, kind in LAYOUTS.items():
+        draw = f"hyuav.physics.layout.{layout}"
+        parts += [
+            f"## `scenario={layout}`",
+            f"The fields of `scenario`, but that [`{draw}`][{draw}] draws `ue_positions`, by "
+            f"`seed` (0)" + (" and:" if fields(kind) else "."),
+            *([table(kind)] if fields(kind) else []),
+        ]
     for name in BUILT_IN:
         parameters = ALGORITHMS[name]
         path = f"{parameters.__module__}.{parameters.__qualname__}"
         parts += [f"## `algorithm={name}`", f"[`{path}`][{path}]", table(parameters)]
     parts += [
+        "## `logger`",
+        "Of every member; the defaults are those of an environment without variables of W&B "
+        "([Tracking](../tracking.md)).",
+        table(LoggerParameters, LoggerParameters.defaults()),
         "## `learners`",
         "In a run's `config.yaml`, and in Python: [`hyuav.Learner`][hyuav.learning.train.Learner].",
         table(Learner),

@@ -13,6 +13,7 @@ from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.robust import RobustDDPG
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.training import TrainingParameters
+from hyuav.physics.families import LAYOUTS
 
 ROOT = Path(__file__).parents[2]
 
@@ -30,6 +31,7 @@ def rows(text: str) -> list[list[str]]:
 def test_every_field_of_scenario_algorithms_and_learners_has_a_row() -> None:
     parts = sections(configuration_page())
     named: dict[str, type[Parameters]] = {"scenario": Scenario, "learners": Learner}
+    named |= {f"scenario={name}": parameters for name, parameters in LAYOUTS.items()}
     named |= {f"algorithm={name}": parameters for name, parameters in ALGORITHMS.items()}
     assert set(parts) == set(named)
     for title, record in named.items():

@@ -130,7 +130,8 @@ def test_degenerate_worlds_give_finite_numbers(changes: dict[str, Any]) -> None:
         ({"batch_size": 2.0}, InputTypeError, "batch_size = 2.0"),
         ({"batch_size": "2"}, InputTypeError, "batch_size = '2'"),
         ({"device": "gpu"}, InputError, "device = 'gpu'"),
-        ({"scenario": [TWO_CLUSTERS]}, InputError, "scenario = '1 scenarios'.*each of 0 rows"),
+        ({"scenario": []}, InputError, "scenario = '0 scenarios'.*each of several rows"),
+        ({"scenario": [[1.0, 2.0]] * 2 + ["x"]}, InputTypeError, r"ue_positions\[2\] = 'x'"),
         (
             {"scenario": [TWO_CLUSTERS] * 3, "batch_size": 2},
             InputError,

@@ -4,12 +4,7 @@ from pathlib import Path
 import pytest
 
 from hyuav import InputError, Scenario
-from hyuav.experiments.run_directory import (
-    RunConfiguration,
-    RunDirectory,
-    named_algorithm,
-    named_scenario,
-)
+from hyuav.experiments.run_directory import RunConfiguration, RunDirectory, named_algorithm
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
@@ -89,12 +84,6 @@ def test_a_directory_that_is_no_run_is_refused_in_one_line(
 def test_a_bad_entry_of_a_configuration_is_named(entry: str, value: object) -> None:
     with pytest.raises(InputError, match=rf"^[^\n]*{entry.rstrip('s')}|^[^\n]*(discount|num_ep)"):
         RunConfiguration.from_dict({**CONFIGURATION.to_dict(), entry: value})
-
-
-def test_a_scenario_may_name_a_preset_and_change_it() -> None:
-    name, scenario = named_scenario({"name": "random_disk", "num_slots": 5})
-    assert name == "random_disk"
-    assert scenario == dataclasses.replace(Scenario.preset("random_disk"), num_slots=5)
 
 
 def test_an_algorithm_is_chosen_by_name() -> None:

@@ -49,7 +49,8 @@ def test_defaults_groups_and_sections_are_told(
     call("train", "-h")
     lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
     assert "scenario=two_clusters or random_disk" in lines
-    assert "logger mode, project, entity, group, job_type, name, tags, id" in lines
+    assert "logger=wandb or none, tensorboard" in lines
+    assert "logger library, mode, project, entity, group, job_type, name, tags, id" in lines
 
 
 def test_a_script_is_told_as_it_was_called(call: Call, capsys: pytest.CaptureFixture[str]) -> None:

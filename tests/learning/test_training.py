@@ -155,6 +155,30 @@ def test_a_restored_training_continues_bit_for_bit(name: str, tmp_path: Path) ->
     assert all(torch.equal(best[0][key], best[1][key]) for key in best[0])
 
 
+def test_a_finished_training_goes_on_for_longer_bit_for_bit() -> None:
+    whole, first = training("ddpg_robust"), training("ddpg_robust", num_episodes=4)
+    list(whole.episodes()), list(first.episodes())
+    longer = training("ddpg_robust", num_episodes=6)
+    longer.load_state_dict(first.state_dict())
+    assert [episode.number for episode in longer.episodes()] == [5, 6]
+    for index in range(2):
+        left, right = weights(whole, index), weights(longer, index)
+        assert all(torch.equal(left[key], right[key]) for key in left)
+    assert torch.equal(whole.best_evaluation, longer.best_evaluation)
+
+
+def test_an_evaluation_for_being_the_last_changes_nothing_that_learning_builds_on() -> None:
+    ended, under_way = (training("ddpg_robust", num_episodes=number) for number in (3, 6))
+    (*_, last), episodes = list(ended.episodes()), under_way.episodes()
+    for _ in range(3):
+        next(episodes)
+    assert last.evaluation is not None
+    for one, other in zip(ended.cohorts, under_way.cohorts, strict=True):
+        own, expected = one.state_dict()["modules"], other.state_dict()["modules"]
+        assert own.keys() == expected.keys()
+        assert all(torch.equal(own[name], values) for name, values in expected.items())
+
+
 def test_a_state_of_another_training_is_refused_in_one_line() -> None:
     state = training(learners=seeds(1, 2, 3)).state_dict()
     with pytest.raises(InputError, match=r"^checkpoint: not of a training like this one[^\n]*$"):

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from omegaconf import OmegaConf
 
-from hyuav import Scenario
+from hyuav import Scenario, clusters
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.learning.ddpg import DDPG
 from recipe_calls import TINY, Call, Refusal
@@ -68,6 +68,20 @@ def test_a_saved_scenario_is_chosen_by_the_name_of_its_file(call: Call, tmp_path
     configuration = RunDirectory(run).configuration()
     assert configuration.scenario_name == "campus"
     assert configuration.scenario == dataclasses.replace(campus, num_slots=10)
+
+
+def test_a_layout_is_drawn_by_words_and_kept_with_the_run(call: Call, tmp_path: Path) -> None:
+    words = ("scenario.num_ues=12", "scenario.num_clusters=3", "scenario.seed=3")
+    again = ("train", "scenario=clusters", *words, "scenario.jamming_power=0.2", *SHORT)
+    call(*again, "hydra.run.dir=runs/one")
+    run = RunDirectory(tmp_path / "runs" / "one")
+    drawn = Scenario(ue_positions=clusters([4, 4, 4], seed=3), num_slots=10, jamming_power=0.2)
+    assert run.configuration().scenario == drawn
+    assert run.configuration().scenario_name == "clusters-3"
+    assert len(run.request()["scenario"]["ue_positions"]) == 12
+    before = run.metrics_file.read_bytes()
+    call(*again, "hydra.run.dir=runs/one")  # which is finished
+    assert run.metrics_file.read_bytes() == before
 
 
 def test_a_sweep_keeps_a_run_for_each_job(call: Call, tmp_path: Path) -> None:
@@ -230,13 +244,13 @@ def test_a_scenarios_name_is_printed_as_text_that_no_terminal_obeys(
 
 NAMED = ("train", "compare", "evaluate", "reproduce", "report", "draw", "dashboard", "benchmark")
 SECTIONS = {
-    "train": ("training", "logger"),
-    "compare": ("training", "evaluation", "logger"),
-    "evaluate": ("evaluation", "logger"),
-    "reproduce": ("training", "evaluation", "logger"),
+    "train": ("training",),
+    "compare": ("training", "evaluation"),
+    "evaluate": ("evaluation",),
+    "reproduce": ("training", "evaluation"),
 }
 ENTRIES = {
-    "train": ("logger",),
+    "train": ("training",),
     "compare": ("learners", "algorithm"),
     "reproduce": ("seeds",),
     "benchmark": ("parts",),
@@ -261,6 +275,11 @@ REFUSALS = [
     (["train", "algorithm.discount=1.5"], "discount = 1.5: expected a number in [0, 1]"),
     (["train", "training.num_episodes=1.5"], "num_episodes = 1.5: expected a whole number >= 1"),
     (["train", "logger.mode=on"], "mode = 'on': expected one of offline, online, disabled"),
+    (["train", "logger=tensorbord"], "did you mean 'tensorboard'"),
+    (["compare", "logger=3"], "Config group override must be a string"),
+    (["train", "~logger"], "~logger = '': expected one of none, tensorboard, wandb"),
+    (["evaluate", "~logger"], "expected one of as_trained, none, tensorboard, wandb"),
+    (["train", "logger=as_trained"], "expected one of none, tensorboard, wandb"),
     (["train", "device=tpu9"], "device = 'tpu9': expected a device of this machine"),
     (["train", "warm_start=nowhere.pt"], "checkpoint = 'nowhere.pt': expected a checkpoint"),
     (["train", "scenario.ue_positions=[[1,2]"], "no viable alternative at input"),
@@ -281,7 +300,13 @@ REFUSALS = [
     ),
     (["train", "algorithm=[ddpg,td3]"], f"algorithm = '[ddpg,td3]': expected one of {NAMES}"),
     (["reproduce", "algorithm=[ddpg,td3]"], f"algorithm = '[ddpg,td3]': expected one of {NAMES}"),
-    (["train", "~scenario"], "~scenario = '': expected one of random_disk, two_clusters"),
+    (["train", "~scenario"], "~scenario = '': expected one of clusters, disk, random_disk"),
+    (["train", "scenario=disk", "scenario.num_ues=0"], "num_ues = 0: expected a whole number >= 1"),
+    (["train", "scenario=disk", "scenario.radius=101"], "radius = 101.0: expected center + radius"),
+    (["train", "scenario=disk", "scenario.seed=-1"], "seed = -1: expected a whole number >= 0"),
+    (["train", "scenario=disk", "scenario.num_clusters=2"], "unknown field 'num_clusters'"),
+    (["reproduce", "scenario=clusters", "scenario.num_clusters=11"], "expected at most num_ues"),
+    (["benchmark", "scenario=disk", "scenario.center=3"], "center = 3: expected two coordinates"),
     (["train", f"scheme={'[' * 300}{']' * 300}"], "the command line is nested too deep"),
     (["report", "-m", "run=a,b"], "-m: this recipe does a single job: leave it out"),
     (["train", "num_slots.x=3"], "'num_slots.x=3': num_slots has no fields: set num_slots=..."),
@@ -331,10 +356,28 @@ def test_going_on_into_the_runs_own_directory_is_refused_and_loses_nothing(
 ) -> None:
     call("train", "hydra.run.dir=base", *SHORT)
     before = sorted((tmp_path / "base").rglob("*"))
-    accepted = "expected nothing beside it but device=, threads= and logger.NAME="
+    accepted = "device=, threads=, logger.NAME= and training.num_episodes=, not hydra.run.dir"
+    hint = '(warm_start="base" begins a new training with its weights)'
     line = refusal("train", "resume=base", "hydra.run.dir=base")
-    assert line == f"error: resume = 'base': {accepted}, not hydra.run.dir\n"
+    assert line == f"error: resume = 'base': expected nothing beside it but {accepted} {hint}\n"
     assert sorted((tmp_path / "base").rglob("*")) == before
+
+
+def test_a_finished_training_goes_on_for_more_episodes(
+    call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call("train", "hydra.run.dir=run", "training.compile=never", *SHORT)
+    capsys.readouterr()
+    call("train", "resume=run", "training.num_episodes=6")
+    assert "run: this training goes on after episode 4 of 6\n" in capsys.readouterr().out
+    run = RunDirectory(tmp_path / "run")
+    assert run.metrics()["episode"].tolist() == [1, 2, 3, 4, 5, 6]
+    assert run.configuration().training.num_episodes == 6
+    accepted = "expected at least the 6 episodes that are trained already"
+    line = refusal("train", "resume=run", "training.num_episodes=5")
+    assert line == f"error: num_episodes = 5: {accepted}\n"
+    line = refusal("train", "resume=run", "training.num_episodes=8", "training.batch_size=4")
+    assert "not training.batch_size (warm_start=" in line
 
 
 def test_a_mistake_on_the_command_line_ends_the_process_with_status_2(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The errors a user can cause, each told in one line."""
+"""The errors and warnings a user can cause, each told in one line."""
 
 import difflib
 from collections.abc import Iterable
@@ -14,6 +14,10 @@ class InputTypeError(InputError, TypeError):
 
 class BusyError(InputError):
     """A place where another process works."""
+
+
+class ScenarioWarning(UserWarning):
+    """Something can never be earned in a scenario; the message says in one line why."""
 
 
 class Interrupted(KeyboardInterrupt):

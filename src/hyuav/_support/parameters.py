@@ -76,9 +76,18 @@ ZeroOrMore = Annotated[tuple[Element, ...], OrOne]
 OneOrMore = Annotated[tuple[Element, ...], OrOne, Field(min_length=1)]
 
 
-def parameter(default: Any = dataclasses.MISSING, *, symbol: str = "", unit: str = "") -> Any:
-    """Declare a field of :class:`Parameters`: its default, paper symbol and unit."""
-    return dataclasses.field(default=default, metadata={"symbol": symbol, "unit": unit})
+def parameter(
+    default: Any = dataclasses.MISSING,
+    *,
+    factory: Any = dataclasses.MISSING,
+    symbol: str = "",
+    unit: str = "",
+) -> Any:
+    """Declare a field of :class:`Parameters`: its default, or what finds it, symbol and unit."""
+    metadata = {"symbol": symbol, "unit": unit}
+    if factory is not dataclasses.MISSING:
+        return dataclasses.field(default_factory=factory, metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
 
 
 def checked(annotation: Any, name: str, value: Any) -> Any:
@@ -201,6 +210,17 @@ class Parameters(metaclass=_InOneLine):
         """
         return cls(**mapping(cls.__name__.lower(), values))
 
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """The plain default of each field, unchecked; those that have none are left out."""
+        values = {}
+        for field in dataclasses.fields(cls):
+            if field.default_factory is not dataclasses.MISSING:
+                values[field.name] = _as_lists(field.default_factory())
+            elif field.default is not dataclasses.MISSING:
+                values[field.name] = _as_lists(field.default)
+        return values
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values (numbers, strings, lists, mappings), as :meth:`from_dict` takes them."""
         return {
@@ -227,6 +247,8 @@ class Parameters(metaclass=_InOneLine):
 def _as_lists(value: Any) -> Any:
     if isinstance(value, Parameters):
         return value.to_dict()
+    if isinstance(value, Mapping):
+        return {name: _as_lists(entry) for name, entry in value.items()}
     return [_as_lists(item) for item in value] if isinstance(value, tuple) else value
 
 
@@ -284,7 +306,7 @@ def _in_one_line(error: ValidationError, annotation: Any, value: Any, name: str 
             name = f"{name}.{part}" if name else str(part)
             if refusal := _of_names(kind, owner, part, hints, value):
                 return refusal
-            annotation, value = hints[part], value.get(part)
+            annotation, value = hints[part], value.get(part, first["input"])  # or the default
         elif kind != "missing":  # or the tuple as a whole is too short
             elements = typing.get_args(expected)
             annotation = elements[0 if elements[-1] is ... else part]

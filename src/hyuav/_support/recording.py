@@ -9,6 +9,7 @@ them is left, nor any check of it before each call, which is what costs in small
 import os
 import shlex
 import shutil
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -152,5 +153,6 @@ def compile_graph(
     fake = FakeTensorMode(shape_env=ShapeEnv())  # which Inductor's cache on the disk needs
     examples: Any = [fake.from_tensor(each, static_shapes=True) for each in arguments]
     options = {"cpp_cache_precompile_headers": False, **options}  # they cost more than they save
-    with torch.no_grad(), tracing(TracingContext(fake)):
+    with torch.no_grad(), tracing(TracingContext(fake)), warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of PyTorch's own modules
         return torch._inductor.compile(graph, examples, options=options)

@@ -3,16 +3,18 @@
 Loading takes seconds, in which nothing is done that would have to be kept. Until :func:`loaded`,
 Ctrl-C therefore ends the program at once, with status 130; in the worker of a program it does
 nothing, since the program ends its workers. An ``InputError`` that nobody answers ends it with
-status 2.
+status 2. A ``ScenarioWarning`` is one line without its place in the code.
 """
 
 import multiprocessing
 import os
 import signal
 import sys
+import warnings
 from types import FrameType, TracebackType
+from typing import TextIO
 
-from hyuav._support.errors import InputError
+from hyuav._support.errors import InputError, ScenarioWarning
 
 called: list[str] = []
 """The words of the command, such as ``hyuav train``; none where Python was given a file to run."""
@@ -42,6 +44,21 @@ def _tell(kind: type[BaseException], error: BaseException, traceback: TracebackT
     sys.exit(2)
 
 
+def _warn(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    if issubclass(category, ScenarioWarning):  # a line for whoever called the command
+        print(f"warning: {message}", file=file or sys.stderr)
+        return
+    _show(message, category, filename, lineno, file, line)
+
+
+_show, warnings.showwarning = warnings.showwarning, _warn
 sys.excepthook = _tell
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored
     is_worker = multiprocessing.parent_process() is not None

@@ -3,40 +3,51 @@
 import dataclasses
 import operator
 from collections.abc import Sequence
+from typing import Any, TypeGuard
 
 import torch
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.physics.offloading import MODE_RULES
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Point, Scenario
 
 LAYOUT = ("ue_positions", "legitimate_position", "helper_starts", "eavesdropper_positions")
 """The fields of a scenario in which the rows of a batch may differ."""
 
 
-def as_scenario(scenario: Scenario | str) -> Scenario:
-    """A scenario as it is, or the preset of that name."""
+ScenarioLike = Scenario | str | Sequence[Point]
+"""A scenario, a preset's name, or UE positions in m, all else being as in the paper."""
+
+
+def as_scenario(scenario: object) -> Scenario:
+    """A scenario as it is, the preset of that name, or the paper's with these UE positions."""
     if isinstance(scenario, str):
         return Scenario.preset(scenario)
+    if _is_layout(scenario):
+        return Scenario(ue_positions=scenario)
     if not isinstance(scenario, Scenario):
-        raise InputTypeError(rejection("scenario", scenario, "a Scenario or a preset's name"))
+        accepted = "a Scenario, a preset's name or UE positions"
+        raise InputTypeError(rejection("scenario", scenario, accepted))
     return scenario
 
 
 def as_scenarios(
-    scenario: Scenario | str | Sequence[Scenario | str], batch_size: torch.Size
-) -> tuple[Scenario, ...]:
-    """One scenario for all rows, or one for each row of the batch's first dimension.
+    scenario: Any, batch_size: int | Sequence[int]
+) -> tuple[tuple[Scenario, ...], torch.Size]:
+    """One scenario for all rows, or one for each row of the batch's first dimension; and the batch.
 
-    Those of several rows differ in their nodes' positions only, and in no number of nodes.
+    Those of several rows differ in their nodes' positions only, and in no number of nodes. Without
+    a batch size, there is a row for each.
     """
-    if isinstance(scenario, Scenario | str) or not isinstance(scenario, Sequence):
-        return (as_scenario(scenario),)
+    sizes = as_batch_size(batch_size)
+    several = isinstance(scenario, Sequence) and not isinstance(scenario, str)
+    if not several or _is_layout(scenario):
+        return (as_scenario(scenario),), sizes
     scenarios = tuple(as_scenario(each) for each in scenario)
-    rows = batch_size[0] if batch_size else 0
-    if len(scenarios) != rows:
-        accepted = f"one scenario, or one for each of {rows} rows"
+    sizes = sizes or torch.Size((len(scenarios),))
+    if not scenarios or len(scenarios) != sizes[0]:
+        accepted = f"one scenario, or one for each of {sizes[0] or 'several'} rows"
         raise InputError(rejection("scenario", f"{len(scenarios)} scenarios", accepted))
     for index, other in enumerate(scenarios):
         for field in dataclasses.fields(Scenario):
@@ -45,7 +56,16 @@ def as_scenarios(
             if not same:
                 accepted = f"{field.name} as of scenario[0]: rows differ in positions only"
                 raise InputError(rejection(f"scenario[{index}].{field.name}", own, accepted))
-    return scenarios
+    return scenarios, sizes
+
+
+def _is_layout(value: Any) -> TypeGuard[tuple[Point, ...]]:
+    """Whether these are positions (U, 2): pairs of numbers."""
+    try:
+        first = value[0]
+        return not isinstance(first, str) and isinstance(float(first[0]), float)
+    except (TypeError, ValueError, LookupError):
+        return False
 
 
 def as_batch_size(batch_size: int | Sequence[int]) -> torch.Size:

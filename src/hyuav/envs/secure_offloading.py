@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import checked
 from hyuav.envs.arguments import (
-    as_batch_size,
+    ScenarioLike,
     as_device,
     as_scenarios,
     as_schemes,
@@ -60,11 +60,13 @@ class SecureOffloadingEnv(EnvBase):
     A reset that is given ``position`` (H, 2) starts there, otherwise at ``helper_starts``.
 
     Args:
-        scenario: node positions and parameters, or the name of a preset; or one of these for each
-            row of the batch's first dimension, which differ in positions only.
+        scenario: node positions and parameters, the name of a preset, or UE positions such as
+            :func:`hyuav.disk` draws; or a list of these, one for each row of the batch's first
+            dimension, which differ in positions only.
         scheme: "hybrid", "relay" or "jamming"; or one of these for each row of the batch's
             first dimension.
-        batch_size: of the helpers flown at once.
+        batch_size: of the helpers flown at once; where it is left out, a row for each scenario of
+            a list.
         device: of all tensors.
         seed: of the fading and the tasks; the same seed gives the same episode, whether or not
             diagnostics are asked for. Or one for each row of the batch's first dimension, whose
@@ -85,7 +87,7 @@ class SecureOffloadingEnv(EnvBase):
 
     def __init__(
         self,
-        scenario: Scenario | str | Sequence[Scenario | str],
+        scenario: ScenarioLike | Sequence[ScenarioLike],
         scheme: str | Sequence[str] = "hybrid",
         batch_size: int | Sequence[int] = (),
         device: torch.device | str | None = None,
@@ -93,8 +95,9 @@ class SecureOffloadingEnv(EnvBase):
         diagnostics: bool = False,
         fading: bool = False,
     ) -> None:
-        super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
-        self.scenarios = as_scenarios(scenario, self.batch_size)
+        scenarios, batch = as_scenarios(scenario, batch_size)
+        super().__init__(device=as_device(device), batch_size=batch)
+        self.scenarios = scenarios
         self.physics = Physics(self.scenarios[0], self.device, nodes=self._layout())
         self.schemes = as_schemes(scheme, self.batch_size)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)

@@ -8,6 +8,7 @@ from torch import Tensor
 from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
 from hyuav._support.parameters import checked
+from hyuav.envs.arguments import ScenarioLike
 from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.observation import JointView
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
@@ -72,7 +73,7 @@ class Geofence(Transform):
 
 
 def make_env(
-    scenario: Scenario | str | Sequence[Scenario | str],
+    scenario: ScenarioLike | Sequence[ScenarioLike],
     scheme: str | Sequence[str] = "hybrid",
     batch_size: int | Sequence[int] = (),
     device: torch.device | str | None = None,

@@ -38,13 +38,18 @@ from hyuav._support.interruption import interrupted_by_sigterm
 from hyuav._support.parameters import Parameters, mapping, refuse_unknown, unknown_field
 from hyuav._support.start import loaded, program
 from hyuav.experiments.configuration_files import read_files_as_data
+from hyuav.experiments.elsewhere import AS_TRAINED, as_trained
 from hyuav.experiments.own_algorithms import run_named, with_own
+from hyuav.experiments.scenarios import NAMES, offered
+from hyuav.experiments.tracking import LoggerParameters, loggers
 from hyuav.experiments.usage import usage
 from hyuav.learning.registry import ALGORITHMS, file_name, run_own
-from hyuav.physics.scenario import PRESETS, Scenario
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
 """In the pattern of a run's directory, when the command was called."""
+
+LOGGER = "logger"
+"""The group whose members have no name of their own: its ``name`` is that of the run."""
 
 Config = dict[str, Any]
 """A composed configuration in plain values."""
@@ -52,21 +57,26 @@ Config = dict[str, Any]
 Record = TypeVar("Record", bound=Parameters)
 
 
-def register(groups: Iterable[str]) -> None:
-    """Offer the presets and the algorithms as the groups ``scenario`` and ``algorithm``.
+def register(groups: Mapping[str, str]) -> None:
+    """Offer scenarios, algorithms and loggers as groups of these names.
 
     Args:
-        groups: that are wanted. Where one is not, its name is free for a plain entry.
+        groups: that are wanted, and the member chosen by default. Where one is not, its name is
+            free for a plain entry.
     """
     store = ConfigStore.instance()
-    members: dict[str, dict[str, tuple[str, Parameters]]] = {
-        "scenario": {name: (name, Scenario.preset(name)) for name in PRESETS},
-        "algorithm": {file_name(name): (name, kind()) for name, kind in ALGORITHMS.items()},
+    members: dict[str, Mapping[str, dict[str, Any]]] = {
+        "scenario": {name: {"name": name, **offered(name)} for name in NAMES},
+        "algorithm": {
+            file_name(name): {"name": name, **kind().to_dict()} for name, kind in ALGORITHMS.items()
+        },
+        LOGGER: loggers(groups.get(LOGGER, "")),
     }
+    if groups.get("scenario") == AS_TRAINED:
+        members["scenario"][AS_TRAINED] = as_trained()
     for group, known in members.items():
         store.repo.pop(group, None)  # with the files of an earlier call
-        for member, (name, parameters) in known.items() if group in groups else ():
-            node = {"name": name, **parameters.to_dict()}
+        for member, node in known.items() if group in groups else ():
             store.store(group=group, name=member, node=node)
 
 
@@ -120,7 +130,9 @@ def recipe(
             register(groups)
             if not {"-h", "--help"}.isdisjoint(sys.argv[1:]):
                 offered = {group: (member, _members(group)) for group, member in groups.items()}
-                told = usage(name, function.__globals__["__doc__"], node, offered, sections)
+                logged = {LOGGER: LoggerParameters.defaults()} if LOGGER in groups else {}
+                fields, names_of = {**node, **logged}, [*sections, *logged]
+                told = usage(name, function.__globals__["__doc__"], fields, offered, names_of)
                 sys.stdout.write(f"{told}\n")  # at once, as what is piped to may end early
                 return
             with _ending_in_one_line(lambda: composed):
@@ -262,8 +274,8 @@ def _plain(
     for name in sections:
         values[name] = mapping(name, values[name])
     for name in groups:  # a user's own file need not repeat its name
-        member = HydraConfig.get().runtime.choices[name]
-        values[name] = {"name": member, **mapping(name, values[name])}
+        own_name = {} if name == LOGGER else {"name": HydraConfig.get().runtime.choices[name]}
+        values[name] = {**own_name, **mapping(name, values[name])}
     return values
 
 

@@ -35,14 +35,19 @@ def require_nodes(policy: Policy, scenario: Scenario) -> None:
 
 
 def learned_policies(
-    runs: Sequence[RunDirectory], scenario: Scenario, schemes: Mapping[str, str] = LEARNED
+    runs: Sequence[RunDirectory],
+    scenario: Scenario,
+    schemes: Mapping[str, str] = LEARNED,
+    *,
+    num_slots: int | None = None,
 ) -> Policies:
-    """The best actors of trainings for the scenario's horizon, as Proposed, Re-OT and Ja-OT.
+    """The best actors of trainings for a horizon, as Proposed, Re-OT and Ja-OT.
 
     Args:
         runs: of the trainings.
         scenario: to fly.
         schemes: that the actors count as, by mode rule.
+        num_slots: horizon that the actors were trained for; the scenario's where it is None.
 
     Raises:
         InputError: a run or its checkpoint cannot be read, its actors observe another number of
@@ -50,12 +55,13 @@ def learned_policies(
     """
     policies: Policies = {}
     horizons: set[int] = set()
+    wanted = num_slots or scenario.num_slots
     for run in runs:
         configuration, weights = run.trained()
         horizons.update(configuration.horizons)
         by_scheme: dict[str, list[int]] = {}
         for index, learner in enumerate(configuration.learners):
-            if configuration.horizons[index] == scenario.num_slots:
+            if configuration.horizons[index] == wanted:
                 by_scheme.setdefault(schemes[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
             policy = configuration.policy(weights, indices)
@@ -63,7 +69,7 @@ def learned_policies(
             policies.setdefault(scheme, []).append(policy)
     if not policies:
         accepted = f"what learners were trained for, {', '.join(map(str, sorted(horizons)))}"
-        raise InputError(rejection("num_slots", scenario.num_slots, accepted))
+        raise InputError(rejection("num_slots", wanted, accepted))
     return policies
 
 

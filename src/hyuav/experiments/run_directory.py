@@ -15,10 +15,11 @@ from pydantic import Field
 from torch import Tensor
 
 from hyuav._support.errors import BusyError, InputError, rejection
-from hyuav._support.files import create_durably, require_writable
+from hyuav._support.files import create_durably, require_writable, write_durably
 from hyuav._support.parameters import checked, mapping
 from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import read_metrics
+from hyuav.experiments.scenarios import named_scenario
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.policy import Policy, learned_policy
@@ -26,7 +27,7 @@ from hyuav.learning.registry import find
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.learning.weights import count_learners
-from hyuav.physics.scenario import PRESETS, Scenario
+from hyuav.physics.scenario import Scenario
 
 REPORT_FILE = "report.html"
 
@@ -60,7 +61,7 @@ class RunConfiguration:
         return cls(
             scenario_name,
             scenario,
-            _learners(values["learners"], scenario.num_slots),
+            _learners(values["learners"], scenario),
             algorithm_name,
             algorithm,
             TrainingParameters.from_dict(mapping("training", values["training"])),
@@ -75,6 +76,22 @@ class RunConfiguration:
             "training": self.training.to_dict(),
         }
 
+    @property
+    def trained_scenario(self) -> Scenario:
+        """The scenario, over its learners' longest horizon where none of them has its own."""
+        if self.scenario.num_slots in self.horizons:
+            return self.scenario
+        return dataclasses.replace(self.scenario, num_slots=max(self.horizons))
+
+    def with_episodes(self, num_episodes: int) -> "RunConfiguration":
+        """The same for another number of episodes.
+
+        Raises:
+            InputError: an unacceptable number.
+        """
+        training = dataclasses.replace(self.training, num_episodes=num_episodes)
+        return dataclasses.replace(self, training=training)
+
     def new_training(self, device: str | None = None) -> Training:
         """The training that is configured, of which nothing is done yet.
 
@@ -86,7 +103,7 @@ class RunConfiguration:
     @property
     def horizons(self) -> tuple[int, ...]:
         """Of the learners, in slots."""
-        return tuple(learner.num_slots or self.scenario.num_slots for learner in self.learners)
+        return tuple(learner.horizon(self.scenario) for learner in self.learners)
 
     def policy(self, weights: dict[str, Tensor], learners: Sequence[int]) -> Policy:
         """The noise-free actors of learners that share a scheme and a horizon.
@@ -106,29 +123,17 @@ class RunConfiguration:
 Learners = Annotated[tuple[Learner, ...], Field(min_length=1, description="a list of learners")]
 
 
-def _learners(values: object, num_slots: int) -> tuple[Learner, ...]:
-    """Learners that differ, where those without a horizon of their own have ``num_slots``."""
+def _learners(values: object, scenario: Scenario) -> tuple[Learner, ...]:
+    """Learners that differ, where those without a horizon of their own have the scenario's."""
     learners: tuple[Learner, ...] = checked(Learners, "learners", values)
     resolved = [
-        dataclasses.replace(learner, num_slots=learner.num_slots or num_slots)
-        for learner in learners
+        dataclasses.replace(learner, num_slots=learner.horizon(scenario)) for learner in learners
     ]
     twice = [learner for learner, times in Counter(resolved).items() if times > 1]
     if twice:
         accepted = "learners that differ in scheme, seed or num_slots"
         raise InputError(rejection("learners", twice[0].to_dict(), accepted))
     return learners
-
-
-def named_scenario(values: object) -> tuple[str, Scenario]:
-    """A scenario and its name, from a preset's name or from the fields with a ``name``."""
-    if isinstance(values, str):
-        return values, Scenario.preset(values)
-    fields = mapping("scenario", values)
-    name = str(fields.pop("name", "custom"))
-    if "ue_positions" not in fields and name in PRESETS:
-        fields["ue_positions"] = PRESETS[name]
-    return name, Scenario.from_dict(fields)
 
 
 def named_algorithm(values: object) -> tuple[str, AlgorithmParameters]:
@@ -186,7 +191,7 @@ class RunDirectory:
                 save_checkpoint(run.last_checkpoint, "training", first_checkpoint)
             create_durably(run.config_file, content.encode())
         except FileExistsError:
-            accepted = "one without a run in it"
+            accepted = "one without a run in it (train resume=DIRECTORY goes on with one)"
             raise InputError(rejection("run directory", str(path), accepted)) from None
         except OSError as error:
             accepted = f"a writable place ({error.strerror})"
@@ -245,6 +250,15 @@ class RunDirectory:
         except InputError as error:
             accepted = f"a run directory with a config.yaml ({error})"
             raise InputError(rejection("run", str(self.path), accepted)) from None
+
+    def change(self, configuration: RunConfiguration) -> None:
+        """Replace the configuration in ``config.yaml``; all else that was asked for stays.
+
+        Raises:
+            OSError: it cannot be written; then the former one is still there.
+        """
+        content = OmegaConf.to_yaml({**self.request(), **configuration.to_dict()})
+        write_durably(self.config_file, content.encode())
 
     def best_weights(self) -> dict[str, Tensor]:
         """The best weights so far of all learners.

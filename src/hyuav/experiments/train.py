@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from torch import Tensor
 
-from hyuav._support.errors import Halted, InputError, cause
+from hyuav._support.errors import Halted, InputError, cause, rejection
 from hyuav._support.interruption import Interruption
 from hyuav._support.terminal import print_line
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
@@ -32,12 +32,12 @@ def train(
     Args:
         directory: of the run.
         configuration: of the training.
-        logger: what Weights & Biases gets.
+        logger: where the metrics go besides.
         console: to show progress on.
         device: to train on.
         initial_weights: to begin with, instead of fresh ones.
         request: all that was asked for, to be kept with the run.
-        logs: directory for the files of Weights & Biases; the run's where it is None.
+        logs: directory for the logger's files; the run's where it is None.
 
     Raises:
         InputError: the directory is taken, or the checkpoint does not fit.
@@ -61,6 +61,7 @@ def resume(
     *,
     device: str | None = None,
     logs: Path | None = None,
+    num_episodes: int | None = None,
 ) -> RunDirectory:
     """Go on with a training from its last checkpoint, in its directory and its W&B run.
 
@@ -68,21 +69,28 @@ def resume(
 
     Args:
         directory: of the run.
-        logger: what Weights & Biases gets.
+        logger: where the metrics go besides.
         console: to show progress on.
         device: to train on.
-        logs: directory for the files of Weights & Biases; the run's where it is None.
+        logs: directory for the logger's files; the run's where it is None.
+        num_episodes: after which it ends, from now on; as configured where it is None.
 
     Raises:
-        InputError: there is no such run, or no checkpoint of it, or it cannot be written to.
+        InputError: there is no such run, or no checkpoint of it, or it cannot be written to, or
+            more episodes are trained already.
         Interrupted: a signal asked to stop.
         Halted: the training cannot go on.
     """
     run = RunDirectory(directory)
     configuration = run.configuration()
+    if num_episodes is not None:
+        configuration = configuration.with_episodes(num_episodes)
     with run.reserved():
         try:
             training, reported = restore(run, lambda: configuration.new_training(device))
+            if num_episodes is not None:
+                _require_none_trained_beyond(num_episodes, training)
+                run.change(configuration)
         except OSError as error:
             raise Halted(f"nothing is done: {cause(error)}") from error
         rest = f"goes on after episode {training.episode} of {training.parameters.num_episodes}"
@@ -90,6 +98,12 @@ def resume(
         print_line(f"{run.path}: this training {told}", console)
         _train(run, configuration, training, logger, console, logs, reported)
     return run
+
+
+def _require_none_trained_beyond(num_episodes: int, training: Training) -> None:
+    if training.episode > num_episodes:
+        accepted = f"at least the {training.episode} episodes that are trained already"
+        raise InputError(rejection("num_episodes", num_episodes, accepted))
 
 
 def _train(
@@ -142,7 +156,7 @@ def train_or_resume(
     Args:
         directory: of the run.
         configuration: of the training.
-        logger: what Weights & Biases gets.
+        logger: where the metrics go besides.
         console: to show progress on.
         device: to train on.
         initial_weights: finds what a new training begins with; None for fresh weights.

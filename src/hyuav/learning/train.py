@@ -9,7 +9,6 @@ import torch
 from pydantic.dataclasses import dataclass
 from tensordict import TensorDictBase
 from torch import Tensor
-from torchrl.collectors import Collector
 
 from hyuav._support.errors import InputError
 from hyuav._support.parameters import Count, CountOrZero, Parameters, parameter
@@ -37,7 +36,7 @@ from hyuav.learning.compile import CompiledSlots, FlownEpisode, all_finite
 from hyuav.learning.exploration import as_planned
 from hyuav.learning.policy import NoiseFreeReturn, fly_noise_free
 from hyuav.learning.replay import latest, make_replay
-from hyuav.learning.torchrl_internals import cursor_of, next_observation, set_filled
+from hyuav.learning.torchrl_internals import Collector, cursor_of, next_observation, set_filled
 from hyuav.learning.weights import (
     begin_moments,
     copy_weights,
@@ -64,6 +63,10 @@ class Learner(Parameters):
     seed: CountOrZero = parameter(0)
     num_slots: Count | None = parameter(None, symbol="T")
     """The horizon; the scenario's where it is None."""
+
+    def horizon(self, scenario: Scenario) -> int:
+        """T: its own, or else the scenario's."""
+        return self.num_slots or scenario.num_slots
 
 
 class Cohort:
@@ -262,18 +265,20 @@ class Cohort:
         )
         return fly_noise_free(env, self.algorithm, self._parameters.reward_scale)
 
-    def keep_best(self, episodes: int, seed: int) -> NoiseFreeReturn:
+    def keep_best(self, episodes: int, seed: int, *, noted: bool = True) -> NoiseFreeReturn:
         """Evaluate; where a learner never earned more, its weights are the best.
 
         Args:
             episodes: flown by each learner.
             seed: of the fading.
+            noted: whether a guide takes note of where the actors fly.
         """
         earned, positions = self.evaluate(episodes, seed)
         better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
         self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
         replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
-        self.algorithm.guide.end_evaluation(positions)
+        if noted:
+            self.algorithm.guide.end_evaluation(positions)
         return earned
 
     def state_dict(self) -> dict[str, Any]:

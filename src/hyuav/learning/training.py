@@ -157,7 +157,7 @@ class Training:
     @property
     def horizons(self) -> tuple[int, ...]:
         """T of each learner."""
-        return tuple(learner.num_slots or self.scenario.num_slots for learner in self.learners)
+        return tuple(learner.horizon(self.scenario) for learner in self.learners)
 
     @property
     def episode(self) -> int:
@@ -223,7 +223,7 @@ class Training:
             slots=tuple(self.episode * horizon for horizon in self.horizons),
             accumulated_reward=self._in_order(rewards),
             losses={name: self._in_order(_mean_loss(flown, name)) for name in self.steps},
-            evaluation=self._keep_best() if self._evaluation_is_due() else None,
+            evaluation=self._end_evaluation(),
             learning=tuple(not slot for slot in self.stopped),
         )
 
@@ -255,9 +255,15 @@ class Training:
             warnings.warn(f"training goes on without compiling ({reason})", stacklevel=2)
             self._can_compile = self._compiles = False
 
-    def _evaluation_is_due(self) -> bool:
+    def _end_evaluation(self) -> NoiseFreeReturn | None:
+        """Evaluate where that is due: every so often, and after the last episode.
+
+        If it is due for being the last alone, learning takes no note of it, so that a training that
+        goes on longer learns as if it had been meant to.
+        """
+        regular = self.episode % self.parameters.evaluation_every == 0
         last = self.episode == self.parameters.num_episodes
-        return last or self.episode % self.parameters.evaluation_every == 0
+        return self._keep_best(noted=regular) if regular or last else None
 
     def evaluate(self, scheme: str | None = None) -> NoiseFreeReturn:
         """Fly the current actors without noise, all through the same fading every time.
@@ -268,10 +274,11 @@ class Training:
         evaluated = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
         return self._together([cohort.evaluate(*evaluated, scheme)[0] for cohort in self.cohorts])
 
-    def _keep_best(self) -> NoiseFreeReturn:
+    def _keep_best(self, *, noted: bool = True) -> NoiseFreeReturn:
         """Evaluate; where a learner has never been better, its weights are the best so far."""
         evaluated = self.parameters.evaluation_episodes, self.parameters.evaluation_seed
-        return self._together([cohort.keep_best(*evaluated) for cohort in self.cohorts])
+        earned = [cohort.keep_best(*evaluated, noted=noted) for cohort in self.cohorts]
+        return self._together(earned)
 
     def _together(self, earned: Sequence[NoiseFreeReturn]) -> NoiseFreeReturn:
         rewards, sum_rates = zip(*earned, strict=True)
@@ -319,6 +326,8 @@ class Training:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue where :meth:`state_dict` was taken, in a training made with the same arguments.
+
+        ``num_episodes`` may be another: a finished training goes on for longer.
 
         Raises:
             InputError: the state is of another algorithm, learner axis or scenario, or damaged; the

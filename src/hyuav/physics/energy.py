@@ -47,12 +47,16 @@ def ue_can_pay(scenario: Scenario, *, relay: bool) -> bool:
     return spent <= scenario.ue_energy_budget
 
 
+def edge_energy(scenario: Scenario, cycles: float) -> float:
+    """Eq. 7 for the edge server: what computing so many cycles in one slot takes, in J."""
+    frequency = torch.tensor(cycles / scenario.slot_duration, dtype=torch.float64, device="cpu")
+    return float(computation_energy(frequency, scenario.capacitance, scenario.slot_duration))
+
+
 def edge_can_saturate(scenario: Scenario) -> bool:
     """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
     cycles = scenario.num_ues * scenario.task_size[1] * scenario.cycles_per_bit[1]
-    frequency = torch.tensor(cycles / scenario.slot_duration, dtype=torch.float64, device="cpu")
-    spent = computation_energy(frequency, scenario.capacitance, scenario.slot_duration)
-    return bool(spent > scenario.edge_energy_budget)
+    return edge_energy(scenario, cycles) > scenario.edge_energy_budget
 
 
 def flight_energy(velocity: Tensor, helper_mass: float, slot_duration: float) -> Tensor:

@@ -11,9 +11,11 @@ from hyuav._support.parameters import CountOrZero, NonNegativeNumber, checked
 from hyuav._support.randomness import derived_seed
 from hyuav.physics.scenario import Point, Scenario
 
-_NumUEs = Annotated[int, Field(ge=1, le=10**6)]
-_Sizes = Annotated[
-    tuple[_NumUEs, ...],
+MOST_UES = 10**6
+
+NumUEs = Annotated[int, Field(ge=1, le=MOST_UES)]
+Sizes = Annotated[
+    tuple[NumUEs, ...],
     Field(min_length=1, description="the numbers of UEs of one cluster or more"),
 ]
 
@@ -81,7 +83,7 @@ def disk(
         InputError: ``num_ues`` below 1, ``radius`` below 0, or a value of the wrong type.
     """
     generator = torch.Generator().manual_seed(checked(CountOrZero, "seed", seed))
-    num_ues = checked(_NumUEs, "num_ues", num_ues)
+    num_ues = checked(NumUEs, "num_ues", num_ues)
     radius = checked(NonNegativeNumber, "radius", radius)
     return _disk(num_ues, radius, checked(Point, "center", center), generator)
 
@@ -110,7 +112,7 @@ def clusters(
         InputError: no cluster, an empty cluster, a negative length, or a value of the wrong type.
     """
     generator = torch.Generator().manual_seed(checked(CountOrZero, "seed", seed))
-    sizes, center = checked(_Sizes, "sizes", sizes), checked(Point, "center", center)
+    sizes, center = checked(Sizes, "sizes", sizes), checked(Point, "center", center)
     cluster_radius = checked(NonNegativeNumber, "cluster_radius", cluster_radius)
     spread = checked(NonNegativeNumber, "spread", spread)
     turn = torch.rand((), generator=generator, dtype=torch.float64)

@@ -10,6 +10,7 @@ from hyuav.physics import channel, energy, motion, offloading, rates
 from hyuav.physics.channel import LinkRow, Links
 from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import ModeRule
+from hyuav.physics.prospects import warn_of_what_cannot_earn
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.tasks import Tasks
 
@@ -106,6 +107,9 @@ class Physics:
         dtype: float32 or float64.
         nodes: where the nodes are before the first slot, where that is not the scenario's layout
             alone; of the scenario's counts.
+
+    Warns:
+        ScenarioWarning: a mode can never earn anything; once in a process.
     """
 
     def __init__(
@@ -126,6 +130,7 @@ class Physics:
         self.edge_can_saturate = energy.edge_can_saturate(scenario)
         """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
         self._standing = self._stand(self.nodes)
+        warn_of_what_cannot_earn(scenario, self._standing.ue_to_legitimate)
 
     def _tensor(self, values: object) -> Tensor:
         return torch.tensor(values, dtype=self.dtype, device=self.device)

@@ -25,7 +25,7 @@ from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection
 from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked
-from hyuav.envs.arguments import as_scenario, as_seed
+from hyuav.envs.arguments import ScenarioLike, as_scenario, as_seed
 from hyuav.physics.offloading import MODE_RULES, ModeRuleName
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
@@ -101,7 +101,7 @@ class FlightPolicy(TensorDictModuleBase):
 
 
 def solve_optimum(
-    scenario: Scenario | str,
+    scenario: ScenarioLike,
     mode_rules: Sequence[str] = MODE_RULES,
     *,
     resolution: float = RESOLUTION,
@@ -145,7 +145,7 @@ def solve_optimum(
 
 
 def solve_horizons(
-    scenario: Scenario | str,
+    scenario: ScenarioLike,
     horizons: Sequence[int],
     mode_rules: Sequence[str] = MODE_RULES,
     *,

@@ -1,3 +1,5 @@
+import sys
+
 import pytest
 
 from hyuav import InputError
@@ -43,3 +45,31 @@ def test_what_weights_and_biases_would_refuse_is_refused_beforehand(
 ) -> None:
     with pytest.raises(InputError, match=rf"^{field}(\[0\])? = [^\n]*: expected [^\n]*text[^\n]*$"):
         LoggerParameters.from_dict({field: value})
+
+
+@pytest.mark.parametrize(
+    ("word", "mode"), [("disabled", "disabled"), ("online", "online"), ("dryrun", "offline")]
+)
+def test_the_mode_of_the_environment_counts_where_none_is_given(
+    monkeypatch: pytest.MonkeyPatch, word: str, mode: str
+) -> None:
+    monkeypatch.setenv("WANDB_MODE", word)
+    assert LoggerParameters().mode == EvaluationLoggerParameters().mode == mode
+    assert LoggerParameters(mode="offline").mode == "offline"
+
+
+def test_a_mode_of_the_environment_that_there_is_not_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("WANDB_MODE", "on")
+    with pytest.raises(InputError, match="mode = 'on': expected one of offline, online, disabled"):
+        LoggerParameters()
+    assert LoggerParameters(mode="offline").mode == "offline"
+
+
+def test_tensorboard_is_asked_for_by_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "tensorboard", None)  # as if it were not installed
+    line = r"^tensorboard cannot be imported: pip install 'hyuav\[tensorboard\]'$"
+    with pytest.raises(InputError, match=line):
+        LoggerParameters(library="tensorboard")
+    assert LoggerParameters().library == "wandb"

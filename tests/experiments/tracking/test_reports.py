@@ -17,7 +17,7 @@ from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.references.straight import re_lt
 from offline_wandb import history, offline_runs, recorded, summary
-from recipe_calls import TINY_COMPARISON, Call
+from recipe_calls import TINY_COMPARISON, TINY_TRAINING, Call
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
 CONFIGURATION = RunConfiguration(
@@ -80,6 +80,19 @@ def test_an_evaluation_of_a_training_that_was_not_logged_is_not_logged(tmp_path:
     asked = EvaluationLoggerParameters(mode="offline")
     log_evaluation(tmp_path / "there", evaluated(), [RunDirectory(run.path)], asked, SILENT)
     assert len(offline_runs(tmp_path / "there")) == 1
+
+
+def test_the_command_line_counts_more_than_the_environment(
+    call: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("WANDB_MODE", "disabled")
+    monkeypatch.setenv("WANDB_PROJECT", "theirs")
+    tiny = (*TINY_TRAINING, "algorithm.hidden_sizes=[8]", "scenario.num_slots=5")
+    call("train", "hydra.run.dir=unasked", *tiny)
+    assert not (tmp_path / "unasked" / "wandb").exists()
+    call("train", "hydra.run.dir=asked", "logger.mode=offline", *tiny)
+    (file,) = offline_runs(tmp_path / "asked")
+    assert recorded(file, "run")[0].project == "theirs"
 
 
 def test_the_trainings_of_a_comparison_are_a_group_and_it_is_one_of_them(

@@ -17,7 +17,7 @@ from hyuav import Scenario
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, Tracker, learner_names
 from hyuav.experiments.tracking.checkpoints import restore
-from hyuav.experiments.tracking.session import remembered
+from hyuav.experiments.tracking.memory import remembered
 from hyuav.learning.checkpoint import load_checkpoint
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.train import Learner

@@ -3,7 +3,8 @@
 import dataclasses
 import itertools
 import math
-from typing import Annotated
+import re
+from typing import Annotated, Any
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
@@ -24,6 +25,7 @@ from hyuav._support.parameters import (
 )
 from hyuav.experiments.comparison.ray import LOCAL
 from hyuav.experiments.evaluation import EvaluationParameters
+from hyuav.experiments.scenarios import NAMES, named_scenario
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.parameters import OFF
@@ -33,7 +35,7 @@ from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
 from hyuav.physics.offloading import MODE_RULES, ModeRuleName
-from hyuav.physics.scenario import Preset, Scenario
+from hyuav.physics.scenario import Scenario
 
 ENTRIES = (*ALGORITHMS, PEER)
 """What can be compared."""
@@ -65,6 +67,7 @@ LAYOUT = "layout-"
 
 Entry = Annotated[Text, Field(description=f"one of {', '.join(ENTRIES)}, FILE.py:CLASS")]
 Piece = Annotated[str, OneOf(*PIECES)]
+ScenarioEntry = Annotated[Any, Field(description=f"one of {', '.join(NAMES)}, or its fields")]
 
 
 @dataclass(frozen=True)
@@ -74,9 +77,11 @@ class Compare(Parameters):
     algorithm: OneOrMore[Entry] = parameter(("ddpg", "ddpg_robust", "td3", "sac"))
     without: ZeroOrMore[Piece] = parameter(())
     """Pieces of a variant, such as ``clock``: it is compared once more for each, without it."""
-    scenario: ZeroOrMore[Preset] = parameter(("random_disk", "two_clusters"))
+    scenario: ZeroOrMore[ScenarioEntry] = parameter(("random_disk", "two_clusters"))
+    """By name, or field by field, such as ``{layout: disk, num_ues: 12, seed: 3}``; what ``name``
+    says is then its name, and its horizons are ``num_slots`` all the same."""
     layouts: Annotated[int, Field(ge=0, le=100_000)] = parameter(0)
-    """Random layouts, besides the presets; see :func:`hyuav.physics.layout.random_layout`."""
+    """Random layouts, besides the scenarios; see :func:`hyuav.physics.layout.random_layout`."""
     layouts_seed: CountOrZero = parameter(1000)
     """Of the first; the others follow."""
     scheme: OneOrMore[ModeRuleName] = parameter(MODE_RULES)
@@ -106,7 +111,7 @@ class Compare(Parameters):
                 find(name)
             place = f"algorithm[{index}]" if len(self.algorithm) > 1 else "algorithm"
             require_choice(place, name, [*names(), PEER])
-        for name in ("algorithm", "without", "scenario", "scheme", "num_slots"):
+        for name in ("algorithm", "without", "scheme", "num_slots"):
             values = getattr(self, name)
             if len(set(values)) < len(values):
                 raise InputError(rejection(name, list(values), "values that differ"))
@@ -114,9 +119,20 @@ class Compare(Parameters):
         if len(varied) > 1:  # "without clock" would be a row of each
             accepted = f"one variant at a time, not {', '.join(sorted(varied))}"
             raise InputError(rejection("without", list(self.without), accepted))
+        self._require_scenarios()
+
+    def _require_scenarios(self) -> None:
         if not self.scenario and not self.layouts:
-            accepted = "at least one preset, or layouts >= 1"
+            accepted = "at least one scenario, or layouts >= 1"
             raise InputError(rejection("scenario", [], accepted))
+        named = [named_scenario(entry) for entry in self.scenario]
+        names = [name for name, _ in named]
+        if len(set(names)) < len(names):
+            raise InputError(rejection("scenario", names, "names that differ"))
+        for name in names:  # which files get
+            if not re.fullmatch(r"\w[\w.-]*", name) or name.startswith(LAYOUT):
+                accepted = f"letters, digits, . _ and -, and not {LAYOUT} at first"
+                raise InputError(rejection("scenario name", name, accepted))
 
     @property
     def entries(self) -> tuple[str, ...]:
@@ -142,10 +158,10 @@ class Compare(Parameters):
         return [range(start, stop) for start, stop in itertools.pairwise(ends)]
 
     def scenarios(self) -> dict[str, Scenario]:
-        """By name, the presets and then the random layouts."""
+        """By name, those that are named and then the random layouts."""
         seeds = range(self.layouts_seed, self.layouts_seed + self.layouts)
         drawn = {f"{LAYOUT}{seed}": Scenario(ue_positions=random_layout(seed)) for seed in seeds}
-        return {name: Scenario.preset(name) for name in self.scenario} | drawn
+        return dict(named_scenario(entry) for entry in self.scenario) | drawn
 
 
 def parameters_of(entry: str) -> AlgorithmParameters:

@@ -1,12 +1,18 @@
-"""Where a training reports to: its run directory, Weights & Biases and the terminal."""
+"""Where a training reports to: its run directory, a logger and the terminal."""
 
-from hyuav.experiments.tracking.parameters import EvaluationLoggerParameters, LoggerParameters
+from hyuav.experiments.tracking.logged_run import Job
+from hyuav.experiments.tracking.parameters import (
+    EvaluationLoggerParameters,
+    LoggerParameters,
+    loggers,
+)
 from hyuav.experiments.tracking.reports import in_group, log_comparison, log_evaluation, part_of
 from hyuav.experiments.tracking.session import Session
 from hyuav.experiments.tracking.tracker import Tracker, learner_names
 
 __all__ = [
     "EvaluationLoggerParameters",
+    "Job",
     "LoggerParameters",
     "Session",
     "Tracker",
@@ -14,5 +20,6 @@ __all__ = [
     "learner_names",
     "log_comparison",
     "log_evaluation",
+    "loggers",
     "part_of",
 ]

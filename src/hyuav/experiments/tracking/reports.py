@@ -1,4 +1,4 @@
-"""What Weights & Biases gets of an evaluation and of a comparison: tables, figures, lineage."""
+"""What is logged of an evaluation and of a comparison: numbers, tables, figures, lineage."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -6,14 +6,20 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import wandb
 from rich.console import Console
 
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.experiments.run_directory import REPORT_FILE, RunDirectory
+from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS
-from hyuav.experiments.tracking.parameters import AS_TRAINED, LONGEST, LoggerParameters
-from hyuav.experiments.tracking.session import Session, model_name, remembered
+from hyuav.experiments.tracking.logged_run import Job
+from hyuav.experiments.tracking.memory import model_name, remembered
+from hyuav.experiments.tracking.parameters import (
+    AS_TRAINED,
+    LONGEST,
+    TENSORBOARD,
+    LoggerParameters,
+)
+from hyuav.experiments.tracking.session import Session
 
 
 def log_evaluation(
@@ -33,32 +39,24 @@ def log_evaluation(
         directory: of the evaluation.
         evaluation: to log.
         runs: of the trainings.
-        logger: which W&B run. The mode "as_trained" is that of the first training's W&B run, and
-            nothing is logged where it has none.
+        logger: by which library, in which run. The mode "as_trained" is that of the first training,
+            and nothing is logged where that was not.
         console: on which the end is told.
     """
-    trained = [known for known in (remembered(run.path) for run in runs) if known]
+    trained = [known for known in map(_training, runs) if known]
     logger = _beside(logger, trained[0] if trained else {})
-    models = [f"{_project(known)}/{model_name(known['id'])}:best" for known in trained]
+    models = [
+        f"{_project(known)}/{model_name(known['id'])}:best" for known in trained if "id" in known
+    ]
     summary = evaluation.summary
     config = {
         "scenario": {"name": summary["scenario"], **summary["parameters"]},
         "evaluation": {name: summary[name] for name in ("num_slots", "episodes", "seed")},
         "models": models,
     }
-    with Session(directory, logger, config, "evaluate", console=console) as session:
-        for model in models:
-            session.use_model(model)
-        session.attempt(lambda run: run.summary.update(_results(summary["schemes"])))
-        session.attempt(
-            lambda run: run.log(
-                {
-                    "schemes": wandb.Table(dataframe=_scheme_table(summary["schemes"])),
-                    "flights": wandb.Table(dataframe=evaluation.flights.astype(object)),
-                    **_media(directory),
-                }
-            )
-        )
+    tables = {"schemes": _scheme_table(summary["schemes"]), "flights": evaluation.flights}
+    with Session(Job(directory, config, "evaluate", models=models), logger, console) as session:
+        session.attempt(lambda run: run.results(_results(summary["schemes"]), tables, directory))
 
 
 def log_comparison(
@@ -74,24 +72,18 @@ def log_comparison(
         directory: of the comparison.
         tables: of its learners by name; the interquartile means of ``algorithms`` are its summary.
         config: all that was asked for.
-        logger: which W&B run.
+        logger: by which library, in which run.
         console: on which the end is told.
     """
     logger = in_group(logger, directory)
-    with Session(
-        directory, logger, config, "comparison", console=console, memory=directory
-    ) as session:
-        session.attempt(
-            lambda run: run.summary.update(
-                tables["algorithms"].set_index("algorithm")["iqm"].add_suffix("/iqm").to_dict()
-            )
-        )
-        session.attempt(
-            lambda run: run.log(
-                {name: wandb.Table(dataframe=own) for name, own in tables.items() if len(own)}
-                | _media(directory)
-            )
-        )
+    algorithms = tables["algorithms"]
+    means = {
+        f"{name}/iqm": float(value)
+        for name, value in zip(algorithms["algorithm"], algorithms["iqm"], strict=True)
+    }
+    filled = {name: table for name, table in tables.items() if len(table)}
+    with Session(Job(directory, config, "comparison", directory), logger, console) as session:
+        session.attempt(lambda run: run.results(means, filled, directory))
 
 
 def in_group(logger: LoggerParameters, directory: Path) -> LoggerParameters:
@@ -115,12 +107,21 @@ def part_of(logger: LoggerParameters, job: Path, directory: Path) -> LoggerParam
     return dataclasses.replace(of_job, name=name[-LONGEST:], id=own_id)
 
 
+def _training(run: RunDirectory) -> dict[str, Any]:
+    """Where a training was logged; empty if nowhere."""
+    known = remembered(run.path)
+    if known or not (run.path / TENSORBOARD).is_dir():
+        return known
+    return {"library": TENSORBOARD, "mode": "offline"}
+
+
 def _beside(logger: LoggerParameters, training: Mapping[str, Any]) -> LoggerParameters:
-    """The training's mode, project, entity and group, where others are not asked for."""
+    """The training's library, mode, project, entity and group, where others are not asked for."""
     known = {name: getattr(logger, name) or training.get(name) for name in ("entity", "group")}
     if logger.mode == AS_TRAINED:
         known["mode"] = training.get("mode", "disabled")
         known["project"] = training.get("project", logger.project)
+        known["library"] = training.get("library", logger.library)
     return LoggerParameters.from_dict({**logger.to_dict(), **known})
 
 
@@ -152,15 +153,3 @@ def _results(schemes: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
         if "fraction_of_optimum" in result:
             values[f"{scheme}/fraction_of_optimum"] = result["fraction_of_optimum"]
     return values
-
-
-def _media(directory: Path) -> dict[str, Any]:
-    """The figures and the report that lie in a directory."""
-    media: dict[str, Any] = {
-        f"figures/{file.stem}": wandb.Image(str(file))
-        for file in sorted((directory / "figures").glob("*.png"))
-    }
-    report = directory / REPORT_FILE
-    if report.is_file():
-        media["report"] = wandb.Html(report.read_text(encoding="utf-8"), inject=False)
-    return media

@@ -1,4 +1,4 @@
-"""Reporting a training: metrics and checkpoints in its directory, W&B, progress on a terminal."""
+"""Reporting a training: metrics and checkpoints in its directory, a logger, progress shown."""
 
 import dataclasses
 import math
@@ -9,13 +9,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import wandb
 from rich.console import Console
 
 from hyuav._support.terminal import TrainingProgress
 from hyuav.experiments.metrics import METRIC_COLUMNS, MetricsFile
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import Reported, save_checkpoints
+from hyuav.experiments.tracking.logged_run import Job, Metric
 from hyuav.experiments.tracking.parameters import LoggerParameters
 from hyuav.experiments.tracking.session import Session
 from hyuav.learning.train import Learner
@@ -48,7 +48,7 @@ def learner_names(learners: Sequence[Learner], horizons: Sequence[int]) -> list[
 class Tracker:
     """Report every episode of a training; use it as a context manager.
 
-    Metrics go to ``metrics.csv`` and, under the same names, to Weights & Biases. Checkpoints are
+    Metrics go to ``metrics.csv`` and, under the same names, to a logger. Checkpoints are
     written every ``checkpoint_every`` seconds, and at the end. A progress bar with the current
     return and the time left is shown on terminals only. A learner that stops is told of on the
     standard error, and has no rows any more.
@@ -57,9 +57,9 @@ class Tracker:
         run: the training's directory.
         configuration: of the training.
         training: whose state the checkpoints hold.
-        logger: what Weights & Biases gets.
+        logger: where the metrics go besides.
         console: to show progress on.
-        logs: directory for the files of Weights & Biases; the run's where it is None.
+        logs: directory for the logger's files; the run's where it is None.
         reported: what was before the training was interrupted: later metrics are dropped, and the
             same W&B run goes on.
 
@@ -86,12 +86,16 @@ class Tracker:
         columns = (*METRIC_COLUMNS, *steps)
         self._metrics = MetricsFile(run.metrics_file, columns, reported.metrics)
         self._session = Session(
-            run.path if logs is None else logs,
+            Job(
+                run.path if logs is None else logs,
+                configuration.to_dict(),
+                "train",
+                memory=run.path,
+                metrics=self._metrics_logged(),
+                first_step=training.episode + 1,
+            ),
             dataclasses.replace(logger, id=logger.id or reported.wandb_id),
-            configuration.to_dict(),
-            "train",
-            console=console,
-            memory=run.path,
+            console,
         )
         self._progress = TrainingProgress(
             console, training.parameters.num_episodes, training.episode
@@ -102,7 +106,6 @@ class Tracker:
 
     def __enter__(self) -> Self:
         self._session.__enter__()
-        self._session.attempt(self._define_metrics)
         self._progress.__enter__()
         return self
 
@@ -114,16 +117,7 @@ class Tracker:
     ) -> None:
         self._progress.__exit__(kind, error, traceback)
         self._metrics.close()
-        best = zip(self.names, self.training.best_evaluation.tolist(), strict=True)
-        self._session.log_model(
-            {"last": self.run.last_checkpoint, "best": self.run.best_checkpoint},
-            {
-                "scenario": self._configuration.scenario_name,
-                "algorithm": self._configuration.algorithm_name,
-                "episodes": self.training.episode,
-                "best_evaluation": {name: value for name, value in best if math.isfinite(value)},
-            },
-        )
+        self._session.attempt(lambda logged: logged.model(*self._model()))
         self._session.__exit__(kind, error, traceback)
 
     def log(self, episode: Episode) -> None:
@@ -132,7 +126,8 @@ class Tracker:
         rows = self._rows(episode)
         if rows:
             self._metrics.append(rows)
-            self._session.log(_by_learner(self.names, self._axes, rows), episode.number)
+            record = _by_learner(self.names, self._axes, rows)
+            self._session.attempt(lambda logged: logged.scalars(record, episode.number))
         waited = time.perf_counter() - self._saved
         if waited >= self.training.parameters.checkpoint_every or self.training.is_finished:
             self.save()
@@ -161,17 +156,30 @@ class Tracker:
                     file=sys.stderr,
                 )
 
-    def _define_metrics(self, run: wandb.Run) -> None:
+    def _metrics_logged(self) -> list[Metric]:
         """Rewards against episodes; losses against slots, in each of which there is an update."""
-        for axis in ("episode", *dict.fromkeys(self._axes)):
-            run.define_metric(axis, hidden=True)
-        for name in ("seconds", "best_evaluation"):
-            run.define_metric(name, step_metric="episode")
+        metrics = [Metric(name, "episode") for name in ("seconds", "best_evaluation")]
         for name, axis in zip(self.names, self._axes, strict=True):
-            for column, summary in SUMMARIES.items():
-                run.define_metric(f"{name}/{column}", step_metric="episode", summary=summary)
-            for step in self.training.steps:
-                run.define_metric(f"{name}/loss_{step}", step_metric=axis, summary="min,last")
+            metrics += [
+                Metric(f"{name}/{column}", "episode", summary)
+                for column, summary in SUMMARIES.items()
+            ]
+            metrics += [
+                Metric(f"{name}/loss_{step}", axis, "min,last") for step in self.training.steps
+            ]
+        return metrics
+
+    def _model(self) -> tuple[dict[str, Path], dict[str, Any]]:
+        """The checkpoints that there are, by alias, and what is told of them."""
+        files = {"last": self.run.last_checkpoint, "best": self.run.best_checkpoint}
+        best = zip(self.names, self.training.best_evaluation.tolist(), strict=True)
+        metadata = {
+            "scenario": self._configuration.scenario_name,
+            "algorithm": self._configuration.algorithm_name,
+            "episodes": self.training.episode,
+            "best_evaluation": {name: value for name, value in best if math.isfinite(value)},
+        }
+        return {alias: file for alias, file in files.items() if file.is_file()}, metadata
 
     def _rows(self, episode: Episode) -> list[dict[str, Any]]:
         seconds = round(time.perf_counter() - self._started, 3)

@@ -9,7 +9,7 @@ import streamlit as st
 from hyuav._support.errors import InputError
 from hyuav._support.formatting import percent
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.experiments.run_directory import named_scenario
+from hyuav.experiments.scenarios import named_scenario
 from hyuav.experiments.schemes import LEARNED, OPTIMA
 from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario

@@ -1,6 +1,5 @@
 """Flights that nobody has evaluated: of trained weights, and of the optimum beside them."""
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -66,8 +65,7 @@ def checkpoint_of(index: RunIndex, name: str, learner: int) -> Checkpoint:
 
 def learner_label(learner: Learner, scenario: Scenario) -> str:
     """What tells a run's learners apart."""
-    horizon = learner.num_slots or scenario.num_slots
-    return f"{learner.scheme}, T = {horizon}, seed {learner.seed}"
+    return f"{learner.scheme}, T = {learner.horizon(scenario)}, seed {learner.seed}"
 
 
 def resolution(scenario: Scenario, *, fine: bool) -> float:
@@ -170,10 +168,7 @@ def fly_now(run: RunDirectory, name: str) -> tuple[Scenario, Evaluation]:
     Raises:
         InputError: the weights cannot be read, or do not fit.
     """
-    configuration = run.configuration()
-    scenario = configuration.scenario
-    if scenario.num_slots not in configuration.horizons:
-        scenario = dataclasses.replace(scenario, num_slots=max(configuration.horizons))
+    scenario = run.configuration().trained_scenario
     policies = learned_policies([run], scenario)
     policies |= straight_policies(scenario)[0]
     return scenario, evaluate(scenario, name, policies, QUICK)

@@ -10,9 +10,11 @@ import pandas as pd
 
 from hyuav._support.errors import InputError
 from hyuav.experiments.comparison.tables import label
+from hyuav.experiments.elsewhere import HORIZONS
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, Evaluation
 from hyuav.experiments.metrics import readable_metrics
-from hyuav.experiments.run_directory import RunDirectory, named_scenario
+from hyuav.experiments.run_directory import RunDirectory
+from hyuav.experiments.scenarios import named_scenario
 from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import learning_curves, learning_table
@@ -26,13 +28,8 @@ from hyuav.viz.data.reading import (
 )
 from hyuav.viz.data.schemes import COMPARED
 
-AS_IN_PAPER, HORIZONS = "as_in_paper", "horizons"
-"""Directories within a main job's run: the paper's own algorithm, and other horizons."""
-
-
-def horizon_directory(run: RunDirectory, num_slots: int) -> Path:
-    """Where the evaluation over another horizon than the scenario's own is kept."""
-    return run.path / HORIZONS / f"T{num_slots}"
+AS_IN_PAPER = "as_in_paper"
+"""Directory of the paper's own algorithm within a main job's run."""
 
 
 def evaluation_directories(directory: Path) -> list[Path]:
@@ -49,7 +46,7 @@ class FinishedRun:
 
     def __init__(self, run: RunDirectory) -> None:
         self.run = run
-        self.scenario: Scenario = run.configuration().scenario
+        self.scenario: Scenario = run.configuration().trained_scenario
 
     @cached_property
     def flights(self) -> pd.DataFrame:
