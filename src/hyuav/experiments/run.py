@@ -37,8 +37,10 @@ class Run:
     @property
     def learners(self) -> tuple[Learner, ...]:
         """Scheme, seed and horizon of each."""
-        pairs = zip(self.configuration.learners, self.configuration.horizons, strict=True)
-        return tuple(replace(learner, num_slots=horizon) for learner, horizon in pairs)
+        return tuple(
+            replace(learner, num_slots=learner.horizon(self.scenario))
+            for learner in self.configuration.learners
+        )
 
     @cached_property
     def metrics(self) -> pd.DataFrame:
