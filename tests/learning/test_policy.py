@@ -164,6 +164,7 @@ WRONG: dict[str, tuple[Any, str]] = {
     "complex numbers": (np.zeros(16, complex), r"observation = dtype\('complex128'\)"),
     "words": (np.array(["a"] * 16), r"observation = dtype\('<U1'\)"),
     "objects": (np.array([None] * 16), r"observation = dtype\('O'\)"),
+    "a sparse tensor": (torch.eye(16).to_sparse(), r"observation = tensor\(indices="),
     "NaN": (np.full(16, np.nan), r"observation = \[nan, "),
     "infinity": (torch.full((2, 16), torch.inf), r"observation = \[\[inf, "),
     "too large a number": (np.full(16, 1e300), r"observation = \[1e\+300, "),

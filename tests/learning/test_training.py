@@ -61,6 +61,18 @@ def test_evaluations_come_as_often_as_asked_and_at_the_end() -> None:
     assert [e.number for e in episodes if e.evaluation is not None] == [2, 4, 5]
 
 
+def test_each_learner_has_a_policy_that_earns_what_it_was_best_at() -> None:
+    trained = training("td3", learners=MIXED, num_episodes=2, evaluation_episodes=500)
+    *_, _ = trained.episodes()
+    for index, policy in enumerate(trained.policies):
+        assert policy.environment["scheme"] == MIXED[index].scheme
+        flown = policy.make_env(batch_size=(3000,), seed=5).rollout(20, policy)
+        assert flown.shape[-1] == trained.horizons[index]
+        earned = flown["next", "episode_reward"][:, -1].mean().item()
+        best = trained.best_evaluation[index].item()
+        assert earned == pytest.approx(best, rel=0.1, abs=0.3)
+
+
 def test_the_best_weights_are_those_of_the_best_evaluation() -> None:
     trained = training(learners=seeds(1, 2, 3, 4), num_episodes=30, evaluation_every=1)
     best = torch.full((4,), -torch.inf)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from hyuav import InputError, load
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.learning.registry import ALGORITHMS
 from recipe_calls import TINY, TINY_COMPARISON, Call, Refusal
@@ -57,6 +58,11 @@ def test_it_trains_and_is_named_again_to_go_on_and_to_be_evaluated(
     call("train", f"resume={path}", f"algorithm={own}")
     call("evaluate", f"run={path}", f"algorithm={own}", *few)
     assert (run / "evaluation.json").exists()
+    forget()
+    with pytest.raises(InputError, match=asked):
+        load(run)
+    policy = load(run, algorithm=str(tmp_path / own)).policy
+    assert policy.make_env(batch_size=3).rollout(6, policy)["action"].shape == (3, 6, 2)
 
 
 def test_jobs_of_a_multirun_may_name_it(call: Call, tmp_path: Path, own: str) -> None:

@@ -11,6 +11,7 @@ from torchrl.envs import TransformedEnv
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.learning.policy import Policy
+from hyuav.learning.registry import run_own
 from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
 
@@ -36,8 +37,10 @@ class Run:
     @property
     def learners(self) -> tuple[Learner, ...]:
         """Scheme, seed and horizon of each."""
-        pairs = zip(self.configuration.learners, self.configuration.horizons, strict=True)
-        return tuple(replace(learner, num_slots=horizon) for learner, horizon in pairs)
+        return tuple(
+            replace(learner, num_slots=learner.horizon(self.scenario))
+            for learner in self.configuration.learners
+        )
 
     @cached_property
     def metrics(self) -> pd.DataFrame:
@@ -97,19 +100,23 @@ class Run:
         return self.policy.make_env(**options)
 
 
-def load(path: str | Path) -> Run:
+def load(path: str | Path, algorithm: str | None = None) -> Run:
     """A run that was kept: its configuration, its metrics and its learners' policies.
 
     Args:
         path: of the run's directory.
+        algorithm: ``FILE.py:CLASS`` of a run whose algorithm is the user's own; the file is run.
 
     Raises:
-        InputError: there is no run here, or its ``config.yaml`` is not one.
+        InputError: there is no run here, its ``config.yaml`` is not one, or there is no such
+            algorithm.
 
     Example:
         >>> run = load("runs/NAME")
         >>> flights = run.make_env(batch_size=64, seed=0).rollout(20, run.policy)
         >>> run.policy.export("policy.onnx")
     """
+    if algorithm is not None:
+        run_own(algorithm)
     directory = RunDirectory(path)
     return Run(directory, directory.configuration())

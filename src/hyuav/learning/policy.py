@@ -228,7 +228,7 @@ class Policy(TensorDictModuleBase):
 
     def _act(self, observation: Tensor) -> Tensor:
         """Flatten what lies between the learners and the features, and apply the network."""
-        if not isinstance(observation, Tensor):
+        if not isinstance(observation, Tensor) or observation.layout != torch.strided:
             raise InputTypeError(rejection("observation", observation, self._accepted))
         if not observation.is_floating_point():
             raise InputTypeError(rejection("observation", observation.dtype, self._accepted))

@@ -31,7 +31,7 @@ from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import require_entries, require_like
 from hyuav.learning.compile import FlownEpisode
 from hyuav.learning.memory import require_memory
-from hyuav.learning.policy import NoiseFreeReturn
+from hyuav.learning.policy import NoiseFreeReturn, Policy, learned_policy
 from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learners
 from hyuav.physics.scenario import Scenario
@@ -128,6 +128,7 @@ class Training:
         if not isinstance(algorithm, AlgorithmParameters):
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
         self.scenario, self.parameters = scenario, parameters
+        self._algorithm = algorithm
         self.learners = tuple(learners)
         device = as_device(device)
         on_cpu = device.type == "cpu"
@@ -192,6 +193,16 @@ class Training:
         """The weights that reached it, of all learners."""
         weights = join_learners([cohort.best_weights for cohort in self.cohorts])
         return select_learners(weights, self._order)
+
+    @property
+    def policies(self) -> tuple[Policy, ...]:
+        """How each learner flies with these weights."""
+        weights = self.best_weights
+        own = [dataclasses.replace(self.scenario, num_slots=horizon) for horizon in self.horizons]
+        return tuple(
+            learned_policy(own[index], self._algorithm, weights, [index], learner.scheme)
+            for index, learner in enumerate(self.learners)
+        )
 
     def _in_order(self, values: Sequence[Tensor]) -> Tensor:
         """Values (n,) of each cohort as those of all learners (N,)."""
