@@ -9,6 +9,7 @@ from api import ROOMS, SHARED, modules, pages
 from configuration import accepted, configuration_page, descriptions, recipes_page, table
 from hyuav import Guide, Learner, Scenario
 from hyuav._support.parameters import OneOrMore, Parameters, Text, ZeroOrMore
+from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.robust import RobustDDPG
 from hyuav.learning.registry import ALGORITHMS
@@ -28,10 +29,11 @@ def rows(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
 
 
-def test_every_field_of_scenario_algorithms_and_learners_has_a_row() -> None:
+def test_every_field_of_scenario_algorithms_loggers_and_learners_has_a_row() -> None:
     parts = sections(configuration_page())
     named: dict[str, type[Parameters]] = {"scenario": Scenario, "learners": Learner}
     named |= {f"scenario={name}": parameters for name, parameters in LAYOUTS.items()}
+    named["logger"] = LoggerParameters
     named |= {f"algorithm={name}": parameters for name, parameters in ALGORITHMS.items()}
     assert set(parts) == set(named)
     for title, record in named.items():
@@ -50,16 +52,18 @@ def test_every_recipe_has_a_section_with_its_options() -> None:
     parts = sections(recipes_page())
     assert set(parts) == {path.name for path in (ROOT / "recipes").glob("*.py")}
     train = [row[0] for row in rows(parts["train.py"])]
-    assert {"`learners`", "`warm_start`", "`num_episodes`", "`mode`"} <= set(train)
+    assert {"`learners`", "`warm_start`", "`num_episodes`"} <= set(train)
     for file, text in parts.items():
         assert re.search(rf"^hyuav (copy )?{file.removesuffix('.py')}\b", text, re.MULTILINE)
 
 
 def test_a_recipe_that_changes_a_default_shows_its_own() -> None:
-    of_compare = {row[0]: row[1] for row in rows(sections(recipes_page())["compare.py"])}
-    of_train = {row[0]: row[1] for row in rows(sections(recipes_page())["train.py"])}
+    parts = sections(recipes_page())
+    of_compare = {row[0]: row[1] for row in rows(parts["compare.py"])}
+    of_train = {row[0]: row[1] for row in rows(parts["train.py"])}
     assert (of_train["`num_episodes`"], of_compare["`num_episodes`"]) == ("`1000`", "`600`")
-    assert (of_train["`mode`"], of_compare["`mode`"]) == ("`offline`", "`disabled`")
+    assert "`logger=wandb`" in parts["train.py"]
+    assert "`logger=none`" in parts["compare.py"]
 
 
 def test_a_row_gives_default_check_unit_symbol_and_meaning() -> None:

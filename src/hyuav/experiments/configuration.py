@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import logging
 import os
 import re
 import shlex
@@ -126,7 +125,6 @@ def recipe(
             nonlocal composed, references
             composed = False
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
-            logging.getLogger("torchrl").setLevel(logging.WARNING)
             register(groups)
             if not {"-h", "--help"}.isdisjoint(sys.argv[1:]):
                 offered = {group: (member, _members(group)) for group, member in groups.items()}

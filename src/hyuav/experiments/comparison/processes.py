@@ -1,6 +1,5 @@
 """Independent pieces of work, several at a time, of which one that fails stops no other."""
 
-import logging
 import multiprocessing
 import os
 import queue
@@ -105,9 +104,8 @@ def _end_with_parent() -> None:
 
 
 def settle() -> None:
-    """Make a worker of this process: one thread, and no word but warnings."""
+    """Make a worker of this process: one thread."""
     torch.set_num_threads(1)
-    logging.getLogger("torchrl").setLevel(logging.WARNING)
 
 
 def attempt(function: Callable[[Piece], None], piece: Piece) -> str | None:

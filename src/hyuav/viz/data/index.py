@@ -24,7 +24,7 @@ STATES = ("running", "finished", "stopped")
 _DEEPEST = 6
 """Directories below the root in which runs are looked for, as in comparisons and sweeps."""
 
-_WITHOUT_RUNS = {"checkpoints", "figures", "wandb", "optima"}
+_WITHOUT_RUNS = {"checkpoints", "figures", "wandb", "tensorboard", "optima"}
 
 _LONGEST_HEADER = 2**20
 """Bytes; no training writes a longer first line of ``metrics.csv``."""
