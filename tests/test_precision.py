@@ -18,7 +18,6 @@ from hyuav import (
     EvaluationParameters,
     FlightPolicy,
     Learner,
-    Policy,
     Scenario,
     Training,
     TrainingParameters,
@@ -31,7 +30,7 @@ from hyuav import (
     solve_optimum,
 )
 from hyuav.envs.rendering import render_frame
-from hyuav.learning.policy import LearnedPolicy
+from hyuav.learning.policy import learned_policy
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.physics.slot import Control, Physics
 from hyuav.viz.data.maps import helper_map
@@ -81,10 +80,10 @@ def assert_equal(found: Any, expected: Any) -> None:
 
 def flights() -> Any:
     brought = []
-    for scenario, options in ((SCENARIO, {"seed": 3}), (FULL_EDGE, {"seed": [1, 2, 3]})):
-        schemes = ["hybrid", "relay", "jamming"]
-        more = {"diagnostics": True, "fading": True, "clock": True, "geofence": True}
-        env = make_env(scenario, schemes, 3, **options, **more)
+    more: dict[str, Any] = {"diagnostics": True, "fading": True, "clock": True, "geofence": True}
+    seeds: list[Any] = [3, [1, 2, 3]]
+    for scenario, seed in zip((SCENARIO, FULL_EDGE), seeds, strict=True):
+        env = make_env(scenario, ["hybrid", "relay", "jamming"], 3, seed=seed, **more)
         state = env.reset()
         for _ in range(7):
             state["action"] = torch.full((3, 2), -0.3, dtype=torch.float32, device="cpu")
@@ -95,7 +94,7 @@ def flights() -> Any:
 
 
 def gymnasiums() -> Any:
-    one = gymnasium.make("hyuav/SecureOffloading-v0", scenario=SCENARIO, clock=True)
+    one: Any = gymnasium.make("hyuav/SecureOffloading-v0", scenario=SCENARIO, clock=True)
     many = gymnasium.make_vec("hyuav/SecureOffloading-v0", 3, scenario=SCENARIO, clock=True)
     brought = [one.observation_space.high, one.reset(seed=1), many.reset(seed=2)]
     for _ in range(5):
@@ -107,8 +106,8 @@ def gymnasiums() -> Any:
 def references() -> Any:
     scenario = Scenario.preset("two_clusters")
     optima = solve_optimum(scenario, resolution=10.0, draws=8, evaluation_draws=20)
-    straight = {"re_lt": [Policy(re_lt(scenario))], "ja_lt": [Policy(ja_lt(scenario))]}
-    best = {"optimum": [Policy(FlightPolicy(optima["hybrid"].path, scenario))]}
+    straight = {"re_lt": [re_lt(scenario)], "ja_lt": [ja_lt(scenario)]}
+    best = {"optimum": [FlightPolicy(optima["hybrid"].path, scenario)]}
     flown = evaluate(scenario, "", best | straight, EvaluationParameters(episodes=4))
     return optima, flown, random_layout(0), random_layout(1)
 
@@ -139,8 +138,9 @@ def trained(name: str, compiled: str = "never") -> Any:
     parameters = dataclasses.replace(SHORT, compile=compiled)
     training = Training(SCENARIO, [Learner("relay", 1)], algorithm, parameters)
     episodes = list(training.episodes())
-    policy = LearnedPolicy(SCENARIO, algorithm, training.best_weights)
-    env = make_env(SCENARIO, batch_size=2, seed=0, **algorithm.environment)
+    policy = learned_policy(SCENARIO, algorithm, training.best_weights)
+    options: dict[str, Any] = algorithm.environment
+    env = make_env(SCENARIO, batch_size=2, seed=0, **options)
     action = policy(env.reset())["action"]
     return episodes, training.state_dict(), action
 

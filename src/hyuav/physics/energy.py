@@ -34,7 +34,7 @@ def relay_energy(relayed_ues: Tensor, relay_power: Tensor | float, share: float)
     return relayed_ues * (relay_power * share / 2)
 
 
-def jamming_energy(jamming_power: Tensor | float, slot_duration: float) -> Tensor | float:
+def jamming_energy(jamming_power: float, slot_duration: float) -> float:
     """Transmission energy in jamming mode, p_J Delta in J: the helper jams through the slot."""
     return jamming_power * slot_duration
 
@@ -89,7 +89,7 @@ def budget_speeds(scenario: Scenario, mode_rule: str) -> list[float]:
         one for each helper.
     """
     relaying = scenario.relay_power * scenario.slot_duration / 2
-    jamming = float(jamming_energy(scenario.jamming_power, scenario.slot_duration))
+    jamming = jamming_energy(scenario.jamming_power, scenario.slot_duration)
     modes = fixed_modes(mode_rule, scenario.num_helpers)
     transmissions = (
         [max(relaying, jamming)] * scenario.num_helpers
