@@ -47,6 +47,7 @@ class CompiledEnv(TransformedEnv):
         # What is found at the start is what a slot brings in which the helper stays there.
         before = self.full_state_spec.zero()
         before["position"] = self.base_env.start(tensordict)
+        before.update(self.base_env.drawn_layouts())
         before["action"] = self.full_action_spec["action"].zero()
         before["episode_reward"] = self.full_reward_spec["reward"].zero()
         before["step_count"] = torch.full_like(before["episode_reward"], -1, dtype=torch.int64)
@@ -72,6 +73,7 @@ class CompiledEnv(TransformedEnv):
     @property
     def _input_keys(self) -> list[Any]:
         keys: list[Any] = ["position", "action", "episode_reward", "step_count"]
+        keys += self.base_env.node_entries(self.base_env.physics.nodes)
         return [*keys, ("diagnostics", "edge_load")] if self.base_env.diagnostics else keys
 
     def _inputs(self, tensordict: TensorDictBase) -> list[Tensor]:

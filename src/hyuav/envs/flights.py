@@ -107,7 +107,8 @@ class Flights:
     def frame(self, row: tuple[int, ...] = ()) -> NDArray[np.uint8]:
         """A picture of one row's flight up to now; needs a render mode."""
         assert self._recorder is not None
-        return self._recorder.frame(int(self.state["step_count"][row]), row)
+        scenario = self.env.base_env.scenario_at(self.state, row)
+        return self._recorder.frame(int(self.state["step_count"][row]), row, scenario)
 
     def _enter(self, state: TensorDictBase) -> None:
         self._state = state

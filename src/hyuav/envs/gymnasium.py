@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import Count, checked
-from hyuav.envs.arguments import as_seed
+from hyuav.envs.arguments import ScenarioLike, as_seed
 from hyuav.envs.flights import RENDERING, Flags, Flights, Floats, accepted_options
 from hyuav.envs.transforms import make_env
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.generators import LayoutGenerator
 
 
 class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
@@ -48,7 +48,8 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
     seed, they go on.
 
     Args:
-        scenario: node positions and parameters, or the name of a preset.
+        scenario: node positions and parameters, or the name of a preset; or what draws a layout
+            anew in each episode, such as a :class:`hyuav.LayoutFamily`.
         scheme: "hybrid", "relay" or "jamming".
         clock: append the slots flown to the observation.
         geofence: slow flights so that they end on the map.
@@ -69,7 +70,7 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
 
     def __init__(
         self,
-        scenario: Scenario | str = "two_clusters",
+        scenario: ScenarioLike | LayoutGenerator = "two_clusters",
         scheme: str = "hybrid",
         *,
         clock: bool = False,
@@ -125,7 +126,8 @@ class SecureOffloadingVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
 
     Args:
         num_envs: N.
-        scenario: as for :class:`SecureOffloadingGymEnv`, like the following.
+        scenario: as for :class:`SecureOffloadingGymEnv`, like the following; or a list of
+            scenarios, one for each row.
         scheme: or one for each row.
         clock: append the slots flown to the observation.
         geofence: slow flights so that they end on the map.
@@ -141,7 +143,7 @@ class SecureOffloadingVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     def __init__(
         self,
         num_envs: int = 1,
-        scenario: Scenario | str = "two_clusters",
+        scenario: ScenarioLike | Sequence[ScenarioLike] | LayoutGenerator = "two_clusters",
         scheme: str | Sequence[str] = "hybrid",
         *,
         clock: bool = False,

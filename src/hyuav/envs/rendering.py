@@ -169,7 +169,6 @@ class FlightRecorder:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self.scenario = scenario
         self._slots: deque[tuple[NDArray[Any], NDArray[Any]]] = deque(maxlen=scenario.num_slots + 1)
 
     def add(self, position: NDArray[Any], mode: NDArray[Any]) -> None:
@@ -180,11 +179,13 @@ class FlightRecorder:
         """Take the last slot back, to :meth:`add` it again with some rows started anew."""
         self._slots.pop()
 
-    def frame(self, slots_flown: int, row: tuple[int, ...]) -> NDArray[np.uint8]:
+    def frame(
+        self, slots_flown: int, row: tuple[int, ...], scenario: Scenario
+    ) -> NDArray[np.uint8]:
         """What :func:`render_frame` draws of one row's flight, which is ``slots_flown`` long."""
         slots = list(self._slots)[-1 - slots_flown :]
         path, modes = ([entry[row] for entry in entries] for entries in zip(*slots, strict=True))
-        return render_frame(self.scenario, path, modes)
+        return render_frame(scenario, path, modes)
 
 
 def _covered(scenario: Scenario, helper: Point, *, relay: bool) -> NDArray[np.bool_]:

@@ -1,6 +1,7 @@
 """The helper's flight as a natively batched TorchRL environment."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
@@ -12,16 +13,19 @@ from torchrl.envs import EnvBase
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import checked
 from hyuav.envs.arguments import (
+    NODES,
     ScenarioLike,
     as_device,
     as_scenarios,
     as_schemes,
     as_seed,
     as_seeds,
+    require_layouts,
     require_shape,
 )
 from hyuav.envs.diagnostics import diagnose, diagnostics_spec
 from hyuav.envs.draws import Draws
+from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import ModeRule
 from hyuav.physics.scenario import Scenario
@@ -45,6 +49,8 @@ class SecureOffloadingEnv(EnvBase):
         - ``fading`` float32, only where asked for: the factors of unit mean by which the slot's
           fading multiplied the path gains of all links, in the order that
           :class:`hyuav.physics.channel.LinkRow` gives them and ``unflatten`` names.
+        - ``ue_positions`` (U, 2), ``legitimate_position`` (2,) and ``eavesdropper_positions``
+          (E, 2) float32, m, only where layouts are drawn: of the episode.
         - ``diagnostics``, only where asked for, see :mod:`hyuav.envs.diagnostics`.
 
     Action:
@@ -57,20 +63,23 @@ class SecureOffloadingEnv(EnvBase):
 
     Termination: never.
 
-    A reset that is given ``position`` (H, 2) starts there, otherwise at ``helper_starts``.
+    A reset that is given ``position`` (H, 2) starts there, otherwise at ``helper_starts``. Where
+    layouts are drawn, it draws one for each row that it resets.
 
     Args:
         scenario: node positions and parameters, the name of a preset, or UE positions such as
             :func:`hyuav.disk` draws; or a list of these, one for each row of the batch's first
-            dimension, which differ in positions only.
+            dimension, which differ in positions only. Or what draws layouts anew at each reset,
+            such as a :class:`hyuav.LayoutFamily`.
         scheme: "hybrid", "relay" or "jamming"; or one of these for each row of the batch's
             first dimension.
         batch_size: of the helpers flown at once; where it is left out, a row for each scenario of
             a list.
         device: of all tensors.
-        seed: of the fading and the tasks; the same seed gives the same episode, whether or not
-            diagnostics are asked for. Or one for each row of the batch's first dimension, whose
-            numbers then depend on its own seed alone: rows of equal seeds are equally lucky.
+        seed: of the fading, the tasks and the layouts; the same seed gives the same episode,
+            whether or not diagnostics are asked for. Or one for each row of the batch's first
+            dimension, whose numbers then depend on its own seed alone: rows of equal seeds are
+            equally lucky.
         diagnostics: compute the ``diagnostics`` entry too.
         fading: give the ``fading`` entry too.
 
@@ -87,7 +96,7 @@ class SecureOffloadingEnv(EnvBase):
 
     def __init__(
         self,
-        scenario: ScenarioLike | Sequence[ScenarioLike],
+        scenario: ScenarioLike | Sequence[ScenarioLike] | LayoutGenerator,
         scheme: str | Sequence[str] = "hybrid",
         batch_size: int | Sequence[int] = (),
         device: torch.device | str | None = None,
@@ -95,10 +104,19 @@ class SecureOffloadingEnv(EnvBase):
         diagnostics: bool = False,
         fading: bool = False,
     ) -> None:
-        scenarios, batch = as_scenarios(scenario, batch_size)
+        generator = scenario if isinstance(scenario, LayoutGenerator) else None
+        if generator is not None:
+            require_layouts(generator)
+        fixed = scenario if generator is None else generator.scenario
+        scenarios, batch = as_scenarios(fixed, batch_size)
         super().__init__(device=as_device(device), batch_size=batch)
-        self.scenarios = scenarios
-        self.physics = Physics(self.scenarios[0], self.device, nodes=self._layout())
+        self.scenarios, self.generator = scenarios, generator
+        self.physics = Physics(
+            self.scenarios[0],
+            self.device,
+            nodes=self._layout(),
+            layout_is_known=generator is None,
+        )
         self.schemes = as_schemes(scheme, self.batch_size)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
@@ -113,7 +131,7 @@ class SecureOffloadingEnv(EnvBase):
         self._make_specs()
         self.draws: Draws
         if isinstance(seed, list | tuple):
-            self.draws = Draws(self.physics, self.batch_size, as_seeds(seed, self.batch_size))
+            self.draws = self._make_draws(as_seeds(seed, self.batch_size))
         else:
             self.set_seed(as_seed(seed))
 
@@ -124,7 +142,7 @@ class SecureOffloadingEnv(EnvBase):
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that is flown; where the rows differ in positions, that of the first."""
+        """The scenario that is flown; where rows or episodes differ in positions, one of them."""
         return self.physics.scenario
 
     @property
@@ -150,42 +168,53 @@ class SecureOffloadingEnv(EnvBase):
         def numbers(*shape: int) -> Unbounded:
             return Unbounded((*batch, *shape), dtype=torch.float32, device=device)
 
-        def bounded(bound: float) -> Bounded:
-            shape = (*batch, num_helpers, 2)
-            return Bounded(-bound, bound, shape, dtype=torch.float32, device=device)
+        def bounded(bound: float, *shape: int) -> Bounded:
+            return Bounded(-bound, bound, (*batch, *shape), dtype=torch.float32, device=device)
 
         self.observation_spec = Composite(
-            position=bounded(half),
+            position=bounded(half, num_helpers, 2),
             mode=Categorical(2, (*batch, num_helpers), dtype=torch.int64, device=device),
             distances=numbers(num_helpers, num_targets),
             off_map=flags(num_helpers),
             shape=batch,
             device=device,
         )
+        for name, values in self.node_entries(self.physics.nodes).items():
+            self.observation_spec[name] = bounded(half, *values.shape)
         if self.tells_fading:
             self.observation_spec["fading"] = numbers(self.physics.link_row.size)
         if self.diagnostics:
             self.observation_spec["diagnostics"] = diagnostics_spec(batch, self.scenario, device)
         # What a step reads besides the action; a reset may be given it too.
         self.state_spec = Composite(
-            position=self.observation_spec["position"].clone(), shape=batch, device=device
+            {
+                name: self.observation_spec[name].clone()
+                for name in ("position", *self.node_entries(self.physics.nodes))
+            },
+            shape=batch,
+            device=device,
         )
         if self.diagnostics:
             edge_load = self.observation_spec["diagnostics", "edge_load"].clone()
             self.state_spec["diagnostics"] = Composite(
                 edge_load=edge_load, shape=batch, device=device
             )
-        self.action_spec = bounded(1.0)
+        self.action_spec = bounded(1.0, num_helpers, 2)
         self.reward_spec = numbers(1)
         self.done_spec = Composite(done=flags(1), terminated=flags(1), shape=batch, device=device)
 
     def _set_seed(self, seed: int | None) -> None:
-        self.draws = Draws(self.physics, self.batch_size, as_seed(seed))
+        self.draws = self._make_draws(as_seed(seed))
+
+    def _make_draws(self, seed: int | Sequence[int]) -> Draws:
+        size = 0 if self.generator is None else self.generator.size
+        return Draws(self.physics, self.batch_size, seed, size)
 
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
         position = self.start(tensordict)
         # What is found at the start is what a slot brings in which the helpers stay there.
-        after_reset = self._slot(position, torch.zeros_like(position))[0]
+        nodes = self._nodes(self.drawn_layouts(), position)
+        after_reset = self._slot(nodes, torch.zeros_like(position))[0]
         if self.diagnostics:
             after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
         return after_reset
@@ -197,6 +226,34 @@ class SecureOffloadingEnv(EnvBase):
             starts = self.physics.nodes.helper
             return starts.expand(*self.batch_size, *starts.shape[-2:]).clone()
         return self._checked_position(position)
+
+    def drawn_layouts(self) -> dict[str, Tensor]:
+        """The nodes of episodes that begin now, by their entries; none where they are fixed."""
+        if self.generator is None:
+            return {}
+        entries = self.node_entries(self.generator.draw(self.draws.layouts()))
+        shapes = {name: self.observation_spec[name].shape for name in entries}
+        return {name: values.float().expand(shapes[name]) for name, values in entries.items()}
+
+    def node_entries(self, nodes: Nodes) -> dict[str, Tensor]:
+        """What is told of nodes that do not fly, by entry: all where they are drawn, or nothing."""
+        if self.generator is None:
+            return {}
+        return dict(zip(NODES, (nodes.ue, nodes.legitimate, nodes.eavesdropper), strict=True))
+
+    def _nodes(self, entries: Mapping[str, Tensor] | TensorDictBase, position: Tensor) -> Nodes:
+        """All nodes of a slot, with the helpers at ``position``."""
+        if self.generator is None:
+            return self.physics.nodes._replace(helper=position)
+        ue, legitimate, eavesdropper = (entries[name] for name in NODES)
+        return Nodes(ue, legitimate, position, eavesdropper)
+
+    def scenario_at(self, state: TensorDictBase, row: tuple[int, ...]) -> Scenario:
+        """What one row flies in the episode of ``state``: the scenario with its positions there."""
+        if self.generator is not None:
+            positions = {name: state[name][row].tolist() for name in NODES}
+            return dataclasses.replace(self.scenario, **positions)
+        return self.scenarios[row[0] if len(self.scenarios) > 1 else 0]
 
     def _checked_position(self, position: Tensor) -> Tensor:
         half = self.scenario.map_side / 2
@@ -213,7 +270,7 @@ class SecureOffloadingEnv(EnvBase):
         require_shape("action", action, position.shape)
         action = action.to(torch.float32)  # as specified, whatever is given
         velocity = self.physics.velocity(action, self._norm_limit)
-        after, outcome, tasks = self._slot(position, velocity)
+        after, outcome, tasks = self._slot(self._nodes(tensordict, position), velocity)
         after["reward"] = reward = outcome.sum_rate
         after["done"] = torch.zeros_like(reward, dtype=torch.bool)
         after["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
@@ -224,19 +281,19 @@ class SecureOffloadingEnv(EnvBase):
         return after
 
     def _slot(
-        self, position: Tensor, velocity: Tensor
+        self, nodes: Nodes, velocity: Tensor
     ) -> tuple[TensorDictBase, SlotOutcome, Tasks | None]:
         """Fly one slot: what is observed, what the slot brought, and its tasks."""
         fading = self.draws.fading()
         tasks = self.draws.tasks() if self.draws_tasks else None
         links = None if fading is None else self.physics.link_row.unflatten(fading)
-        nodes = self.physics.nodes._replace(helper=position)
         outcome = slot(self.physics, nodes, Control(velocity, self._mode_rule), links, tasks)
         observed = TensorDict(
             position=outcome.nodes.helper,
             mode=outcome.relays.to(torch.int64),
             distances=outcome.distances,
             off_map=outcome.off_map,
+            **self.node_entries(outcome.nodes),
             batch_size=self.batch_size,
             device=self.device,
         )

@@ -20,6 +20,7 @@ from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.files import write_durably
 from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNumber, parameter
 from hyuav._support.randomness import derived_seed
+from hyuav.envs.arguments import as_scenario
 from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
 from hyuav.physics.scenario import Scenario
@@ -97,6 +98,7 @@ def evaluate(
     Raises:
         InputError: no scheme, an unknown one, or one without a policy.
     """
+    scenario = as_scenario(scenario)
     for scheme, several in policies.items():
         require_choice("scheme", scheme, SCHEMES)
         if not several:
