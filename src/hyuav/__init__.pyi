@@ -26,6 +26,10 @@ from hyuav.learning.td3 import TD3 as TD3
 from hyuav.learning.train import Learner as Learner
 from hyuav.learning.training import Training as Training
 from hyuav.learning.training import TrainingParameters as TrainingParameters
+from hyuav.physics.families import ClustersLayout as ClustersLayout
+from hyuav.physics.families import DiskLayout as DiskLayout
+from hyuav.physics.families import RandomLayout as RandomLayout
+from hyuav.physics.generators import LayoutFamily as LayoutFamily
 from hyuav.physics.layout import clusters as clusters
 from hyuav.physics.layout import disk as disk
 from hyuav.physics.layout import random_layout as random_layout

@@ -41,8 +41,8 @@ def both_flights(scenario: Scenario, **options: Any) -> tuple[TensorDictBase, Te
         positions, modes, count = env.base_env.recorder.flight(0)
         first = [slot.flatten()[0] for slot in slots]
         assert count == len(actions)
-        assert positions[1:].tolist() == [slot["position"][0].tolist() for slot in first]
-        assert modes[1:].tolist() == [slot["mode"].item() for slot in first]
+        assert positions[1:].tolist() == [slot["position"].tolist() for slot in first]
+        assert modes[1:].tolist() == [slot["mode"].tolist() for slot in first]
         # Once compiled, a reset is another way through the same graph.
         anew = env.reset()
         assert env.base_env.recorder.flight(0)[2] == 0

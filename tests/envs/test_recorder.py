@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from torchrl.envs import EnvBase
 from torchrl.record import PixelRenderTransform, VideoRecorder
 from torchrl.record.loggers import CSVLogger
@@ -61,11 +61,11 @@ def test_a_row_that_is_reset_begins_anew_and_the_others_fly_on() -> None:
     state = env.reset(state)
     flown = env.step(state.set("action", torch.zeros(3, 2)))["next"]
     positions, modes, count = env.base_env.recorder.flight(1)
-    torch.testing.assert_close(positions, torch.stack([place(state)[1], place(flown)[1]]))
+    torch.testing.assert_close(positions, torch.stack([state["position"][1], flown["position"][1]]))
     assert (len(modes), count) == (2, 1)
     positions, _, count = env.base_env.recorder.flight(2)
     kept, _ = path_of(flights, (2,))
-    torch.testing.assert_close(positions, torch.cat([kept, place(flown)[2:]]))
+    torch.testing.assert_close(positions[:, 0], torch.cat([kept, place(flown)[2:]]))
     assert count == 5
 
 
@@ -73,7 +73,7 @@ def test_of_a_longer_flight_the_latest_slots_are_kept() -> None:
     env = SecureOffloadingEnv(SHORT, seed=0)
     flights = env.rollout(8)
     positions, _, count = env.recorder.flight(0)
-    torch.testing.assert_close(positions, place(flights["next"])[-4:])
+    torch.testing.assert_close(positions[:, 0], place(flights["next"])[-4:])
     assert count == 8
 
 
@@ -87,14 +87,18 @@ def test_writing_to_what_was_returned_does_not_change_the_picture() -> None:
 
 
 def test_of_a_flight_without_end_no_more_is_kept_than_a_picture_shows() -> None:
-    recorder, position = FlightRecorder(1, 10**6), torch.zeros(1, 2)
-    recorder.start(position, torch.zeros(1))
+    recorder = FlightRecorder(1, 10**6)
+
+    def observed(slot: int) -> TensorDict:
+        return TensorDict(position=torch.full((1, 2), float(slot)), mode=torch.ones(1))
+
+    recorder.start(observed(0))
     for slot in range(1, MOST_SLOTS + 6):
-        recorder.add(position + slot, torch.ones(1))
+        recorder.add(observed(slot))
     positions, modes, count = recorder.flight(0)
     assert count == MOST_SLOTS + 5
     assert len(positions) == len(modes) == MOST_SLOTS + 1
-    assert positions[0].tolist() == [5.0, 5.0]
+    assert positions[0].tolist() == [[5.0, 5.0]]
 
 
 def test_nothing_is_drawn_before_a_reset_or_of_a_row_that_is_not_kept() -> None:

@@ -9,12 +9,17 @@ import torch
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection
+from hyuav.physics.generators import LayoutGenerator
+from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import MODE_RULES, fixed_modes
 from hyuav.physics.scenario import Point, Scenario
 
 LAYOUT = ("ue_positions", "legitimate_position", "helper_starts", "eavesdropper_positions")
 """The fields of a scenario in which the rows of a batch may differ."""
 
+
+NODES = (*LAYOUT[:2], LAYOUT[3])
+"""Those of nodes that do not fly."""
 
 ScenarioLike = Scenario | str | Sequence[Point]
 """A scenario, a preset's name, or UE positions in m, all else being as in the paper."""
@@ -57,6 +62,19 @@ def as_scenarios(
                 accepted = f"{field.name} as of scenario[0]: rows differ in positions only"
                 raise InputError(rejection(f"scenario[{index}].{field.name}", own, accepted))
     return scenarios, sizes
+
+
+def require_layouts(generator: LayoutGenerator) -> None:
+    """Accept a generator whose layouts have its scenario's numbers of nodes.
+
+    Raises:
+        InputError: naming the nodes of which it draws another number.
+    """
+    drawn, expected = generator.draw(torch.zeros(generator.size)), Nodes.of(generator.scenario)
+    for role in Nodes._fields:
+        shape, own = tuple(getattr(expected, role).shape), tuple(getattr(drawn, role).shape)
+        if own != shape:
+            raise InputError(rejection(f"scenario.draw(...).{role}", own, f"shape {shape}"))
 
 
 def _is_layout(value: Any) -> TypeGuard[tuple[Point, ...]]:

@@ -39,7 +39,7 @@ class CompiledEnv(TransformedEnv):
         if self._flight is None or not {"next", "_step"}.isdisjoint(tensordict.keys()):
             return super()._step(tensordict)
         after = self._flown(self._flight, tensordict)
-        self.base_env.recorder.add(after["position"], after["mode"])
+        self.base_env.recorder.add(after)
         return after
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
@@ -49,6 +49,7 @@ class CompiledEnv(TransformedEnv):
         # What is found at the start is what a slot brings in which the helper stays there.
         before = self.full_state_spec.zero()
         before["position"] = self.base_env.start(tensordict)
+        before.update(self.base_env.drawn_layouts())
         before["action"] = self.full_action_spec["action"].zero()
         before["episode_reward"] = self.full_reward_spec["reward"].zero()
         before["step_count"] = torch.full_like(before["episode_reward"], -1, dtype=torch.int64)
@@ -56,7 +57,7 @@ class CompiledEnv(TransformedEnv):
         after["episode_reward"] = before["episode_reward"]
         if self.base_env.diagnostics:
             after["diagnostics"] = self.base_env.observation_spec["diagnostics"].zero()
-        self.base_env.recorder.start(after["position"], after["mode"])
+        self.base_env.recorder.start(after)
         return after
 
     def set_seed(self, seed: Any = None, static_seed: bool = False) -> Any:
@@ -77,6 +78,7 @@ class CompiledEnv(TransformedEnv):
     @property
     def _input_keys(self) -> list[Any]:
         keys: list[Any] = ["position", "action", "episode_reward", "step_count"]
+        keys += self.base_env.node_entries(self.base_env.physics.nodes)
         return [*keys, ("diagnostics", "edge_load")] if self.base_env.diagnostics else keys
 
     def _inputs(self, tensordict: TensorDictBase) -> list[Tensor]:

@@ -1,4 +1,4 @@
-"""What is random in the environment: one draw of fading and tasks for each slot."""
+"""What is random in the environment: fading and tasks of each slot, layouts of each reset."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +14,8 @@ from hyuav.physics.tasks import Tasks, tasks_at
 NUMBERS_AT_ONCE = 2**14
 """Drawn for as many slots as this suffices for, but at least one."""
 
-NAMES = ("fading", "tasks")
+LAYOUTS = "layouts"
+"""What is drawn at a reset; fading and tasks are drawn for each slot."""
 
 
 class Draws:
@@ -32,9 +33,16 @@ class Draws:
         physics: whose fading and tasks are drawn.
         batch_size: of the helpers flown at once.
         seed: of all numbers, or one for each row.
+        layout_size: numbers that decide a layout; 0 where none is drawn.
     """
 
-    def __init__(self, physics: Physics, batch_size: torch.Size, seed: int | Sequence[int]) -> None:
+    def __init__(
+        self,
+        physics: Physics,
+        batch_size: torch.Size,
+        seed: int | Sequence[int],
+        layout_size: int = 0,
+    ) -> None:
         self._physics = physics
         self.rows: Tensor | None = None
         """Which of the distinct seeds each row has; None where one seed is for all."""
@@ -44,13 +52,16 @@ class Draws:
             seeds, inner = list(dict.fromkeys(seed)), batch_size[1:]
             self.rows = self._tensor([seeds.index(own) for own in seed])
         self._rank = 1 + len(inner)
-        keys = [[derived_seed(own, name) for own in seeds] for name in NAMES]
-        self._keys = self._tensor(keys).reshape(len(NAMES), len(seeds), *(1 for _ in inner))
-        widths, device = (physics.link_row.size, 2 * physics.scenario.num_ues), physics.device
-        per_slot = len(seeds) * inner.numel() * widths[0]
+        widths = {"fading": physics.link_row.size, "tasks": 2 * physics.scenario.num_ues}
+        if layout_size:
+            widths[LAYOUTS] = layout_size
+        self._names, device = tuple(widths), physics.device
+        keys = [[derived_seed(own, name) for own in seeds] for name in self._names]
+        self._keys = self._tensor(keys).reshape(len(keys), len(seeds), *(1 for _ in inner))
+        per_slot = len(seeds) * inner.numel() * widths["fading"]
         self._at_once = max(NUMBERS_AT_ONCE // per_slot, 1)
         self._places = {}
-        for name, width in zip(NAMES, widths, strict=True):
+        for name, width in widths.items():
             columns = torch.arange(1, width + 1, device=device).reshape(-1, *(1,) * self._rank)
             helpers = torch.arange(inner.numel(), device=device).reshape(inner)
             self._places[name] = columns * GAMMA, helpers * width * GAMMA, inner.numel() * width
@@ -58,7 +69,7 @@ class Draws:
         self._law = RicianFading.of(physics.k_factor.reshape(-1, *trailing))
         # Tensors, so that a graph that torch.compile makes of a slot counts on; where a GPU need
         # not be waited for.
-        self._slots = dict.fromkeys(NAMES, _count(0))
+        self._slots = dict.fromkeys(self._names, _count(0))
         self._blocks: dict[str, tuple[int, Tensor]] = {}
 
     def _tensor(self, values: object) -> Tensor:
@@ -72,6 +83,10 @@ class Draws:
         """The next slot's tasks, each (*batch_size, U)."""
         return self._as_tasks(self._spread(self._next("tasks")))
 
+    def layouts(self) -> Tensor:
+        """What decides the layouts of the episodes that begin: (*batch_size, layout_size)."""
+        return self._spread(self._take(LAYOUTS, 1))[0]
+
     def take_fading(self, count: int) -> Tensor | None:
         """The fading of the next ``count`` slots: (count, *batch_size, links)."""
         return self._spread(self._take("fading", count)) if self._physics.scenario.fading else None
@@ -84,7 +99,7 @@ class Draws:
     def ticket(self, *, tasks: bool) -> tuple[Tensor, Tensor]:
         """What decides the next slot's fading and, if wanted, tasks; it counts as drawn."""
         slots = torch.stack([*self._slots.values()]).to(self._keys.device)
-        for name, drawn in zip(NAMES, (self._physics.scenario.fading, tasks), strict=True):
+        for name, drawn in (("fading", self._physics.scenario.fading), ("tasks", tasks)):
             self._slots[name] = self._slots[name] + int(drawn)
         return self._keys, slots
 
@@ -102,7 +117,7 @@ class Draws:
     def set_state(self, state: dict[str, Any]) -> None:
         """Continue where :meth:`state` was taken from draws of as many distinct seeds."""
         self._keys = state["keys"].to(self._keys.device).reshape(self._keys.shape)
-        self._slots = {name: _count(int(state[name])) for name in NAMES}
+        self._slots = {name: _count(int(state[name])) for name in self._names}
         self._blocks.clear()
 
     def _spread(self, numbers: Tensor) -> Tensor:
@@ -121,7 +136,7 @@ class Draws:
         """The next slot's numbers, several slots of which are drawn at once, but in a graph."""
         slots = self._slots[name]
         if torch.compiler.is_compiling():
-            numbers = self._numbers(name, self._keys[NAMES.index(name)], slots)
+            numbers = self._numbers(name, self._keys[self._names.index(name)], slots)
             self._slots[name] = slots + 1
             return numbers
         block, place = divmod(int(slots), self._at_once)
@@ -140,10 +155,10 @@ class Draws:
     def _of_slots(self, name: str, first: int, count: int) -> Tensor:
         slots = torch.arange(first, first + count, device=self._keys.device)
         slots = slots.reshape(-1, 1, *(1,) * self._rank)
-        return self._numbers(name, self._keys[NAMES.index(name)], slots).contiguous()
+        return self._numbers(name, self._keys[self._names.index(name)], slots).contiguous()
 
     def _numbers(self, name: str, keys: Tensor, slots: Tensor) -> Tensor:
-        """Fading powers or task levels (..., D, *inner, width) of slots (..., 1, *1).
+        """Fading powers or uniform numbers (..., D, *inner, width) of slots (..., 1, *1).
 
         The helpers are the last dimension until the end: a long loop for a compiler.
         """

@@ -75,14 +75,18 @@ class Flights:
     def reset(
         self, seed: int | list[int] | None, position: ArrayLike | None, mask: Flags | None
     ) -> None:
-        """Start anew at ``position`` (2,) or (*B, 2) m, only in the rows of ``mask`` (*B,)."""
+        """Start anew at ``position`` (2,) or (*B, 2) m, only in the rows of ``mask`` (*B,).
+
+        With several helpers it is (H, 2) or (*B, H, 2).
+        """
         if seed is not None:
             self.env.set_seed(seed, static_seed=True)
-        shape = (*self.env.batch_size, 2)
         start = self.env.base_env.start(None)
         if position is not None:
-            given = _as_tensor("position", position, ((2,), shape), self.env.device)
-            start = given.expand(shape).unsqueeze(-2)
+            one = (2,) if self.scenario.num_helpers == 1 else tuple(start.shape[-2:])
+            shape = (*self.env.batch_size, *one)
+            given = _as_tensor("position", position, (one, shape), self.env.device)
+            start = given.expand(shape).reshape(start.shape)
         if mask is None:
             entries = TensorDict(position=start, batch_size=self.env.batch_size)
         else:
@@ -93,14 +97,16 @@ class Flights:
         self._state = self.env.reset(entries)
 
     def step(self, action: ArrayLike) -> tuple[Floats, Floats, Flags]:
-        """Fly one slot by ``action`` (*B, 2): reward, secrecy sum-rate and truncation, (*B,)."""
+        """Fly a slot by ``action`` (*B, 2 H): reward, secrecy sum-rate and truncation, (*B,)."""
         state = self.state.copy()
-        shape = (*self.env.batch_size, 2)
+        shape = self.env.action_spec.shape
         state["action"] = _as_tensor("action", action, (shape,), self.env.device)
         flown = self.env.step(state)
         after = flown["next"]
         reward = after["reward"]
-        sum_rate = reward + self.scenario.off_map_penalty * after["off_map"].to(reward.dtype)
+        sum_rate = reward + self.scenario.off_map_penalty * after["off_map"].sum(
+            dim=-1, keepdim=True
+        )
         self._state = self.env.step_mdp(flown)
         return _column(reward), _column(sum_rate), _column(after["truncated"])
 
@@ -114,12 +120,16 @@ class Flights:
         # Copied because the caller may write to it, and the next slot starts from it.
         told = self.state.select(*names, strict=False).clone()
         return {
-            "position": told["position"].squeeze(-2).numpy(force=True),
-            "mode": _column(told["mode"]),
-            "off_map": _column(told["off_map"]),
+            "position": self._of_one(told["position"], -2).numpy(force=True),
+            "mode": self._of_one(told["mode"], -1).numpy(force=True),
+            "off_map": self._of_one(told["off_map"], -1).numpy(force=True),
             "secrecy_sum_rate": secrecy_sum_rate,
             **{name: _arrays(told[name]) for name in WHERE_ASKED_FOR if name in told},
         }
+
+    def _of_one(self, values: torch.Tensor, axis: int) -> torch.Tensor:
+        """Values without the helper's axis where there is one helper."""
+        return values.squeeze(axis) if self.scenario.num_helpers == 1 else values
 
     def frame(self, row: int = 0) -> NDArray[np.uint8]:
         """A picture of one row's flight up to now; only the first has one without a render mode."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hyuav._support.errors import InputError, brief, rejection, require_choice
 from hyuav._support.parameters import Count, checked
-from hyuav.envs.arguments import as_seed
+from hyuav.envs.arguments import ScenarioLike, as_seed
 from hyuav.envs.flights import (
     RENDERING,
     Flags,
@@ -27,7 +27,7 @@ from hyuav.envs.flights import (
     with_masks,
 )
 from hyuav.envs.transforms import make_env
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.generators import LayoutGenerator
 
 
 class SecureOffloadingGymEnv(Limited, gymnasium.Env[Floats, Floats]):
@@ -62,7 +62,8 @@ class SecureOffloadingGymEnv(Limited, gymnasium.Env[Floats, Floats]):
     seed, they go on.
 
     Args:
-        scenario: node positions and parameters, or the name of a preset.
+        scenario: node positions and parameters, or the name of a preset; or what draws a layout
+            anew in each episode, such as a :class:`hyuav.LayoutFamily`.
         scheme: "hybrid", "relay" or "jamming".
         max_episode_steps: T, instead of the scenario's ``num_slots``. ``gymnasium.make`` takes it
             too.
@@ -86,7 +87,7 @@ class SecureOffloadingGymEnv(Limited, gymnasium.Env[Floats, Floats]):
 
     def __init__(
         self,
-        scenario: Scenario | str = "two_clusters",
+        scenario: ScenarioLike | LayoutGenerator = "two_clusters",
         scheme: str = "hybrid",
         *,
         max_episode_steps: int | None = None,
@@ -159,7 +160,8 @@ class SecureOffloadingVectorEnv(Limited, VectorEnv[Floats, Floats, NDArray[Any]]
 
     Args:
         num_envs: N.
-        scenario: as for :class:`SecureOffloadingGymEnv`, like the following; or one for each row.
+        scenario: as for :class:`SecureOffloadingGymEnv`, like the following; or a list of
+            scenarios, one for each row.
         scheme: or one for each row.
         autoreset_mode: a mode, or its value: "NextStep", "SameStep" or "Disabled".
         max_episode_steps: T, instead of the scenario's ``num_slots``.
@@ -177,7 +179,7 @@ class SecureOffloadingVectorEnv(Limited, VectorEnv[Floats, Floats, NDArray[Any]]
     def __init__(
         self,
         num_envs: int = 1,
-        scenario: Scenario | str | Sequence[Scenario | str] = "two_clusters",
+        scenario: ScenarioLike | Sequence[ScenarioLike] | LayoutGenerator = "two_clusters",
         scheme: str | Sequence[str] = "hybrid",
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,

@@ -6,6 +6,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import torch
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -67,8 +68,8 @@ def draw_scenario(axes: Axes, scenario: Scenario, covered: ArrayLike | None = No
     axes.set_axisbelow(True)
     axes.grid(color="0.92", linewidth=_width(0.5))
     draw_coverage(axes, scenario.legitimate_position, scenario.coverage_radius, LEGITIMATE_COLOR)
-    _draw_uav(axes, scenario.legitimate_position, LEGITIMATE_LABEL, _LEGITIMATE)
-    _draw_uav(axes, scenario.eavesdropper_positions[0], EAVESDROPPER_LABEL, _EAVESDROPPER)
+    _draw_uavs(axes, [scenario.legitimate_position], LEGITIMATE_LABEL, _LEGITIMATE)
+    _draw_uavs(axes, scenario.eavesdropper_positions, EAVESDROPPER_LABEL, _EAVESDROPPER)
     if covered is None:
         _draw_ues(axes, np.asarray(scenario.ue_positions), UE_COLOR, "UE")
         return
@@ -142,28 +143,34 @@ def _frame_handles() -> list[Artist]:
 def render_frame(
     scenario: Scenario, positions: ArrayLike, modes: ArrayLike, slots_flown: int | None = None
 ) -> NDArray[np.uint8]:
-    """Draw a flight up to now, with the coverage of this slot, as a picture.
+    """Draw flights up to now, with the coverage of this slot, as a picture.
 
     Args:
         scenario: that is flown.
-        positions: (t + 1, 2) m, the start and then the position in each slot up to now.
-        modes: (t + 1,) 1 relay, 0 jamming, at the start and of each slot.
+        positions: (t + 1, H, 2) m, the helpers' starts and then their positions in each slot up to
+            now; of one helper (t + 1, 2) as well.
+        modes: (t + 1, H) 1 relay, 0 jamming, at the start and of each slot; or (t + 1,).
         slots_flown: since the start, where more than the last t; None for t.
 
     Returns:
         (height, width, 3) red, green and blue.
     """
-    path, relays = np.asarray(positions, dtype=float), np.asarray(modes).astype(bool)
-    helper = (float(path[-1, 0]), float(path[-1, 1]))
-    slot = len(path) - 1 if slots_flown is None else slots_flown
+    paths = np.asarray(positions, dtype=float)
+    paths = paths.reshape(len(paths), -1, 2)
+    relays = np.asarray(modes).astype(bool).reshape(len(paths), -1)
+    slot = len(paths) - 1 if slots_flown is None else slots_flown
     figure = Figure(figsize=_FRAME_INCHES, dpi=_FRAME_DPI)
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes(_FRAME_MAP)  # fixed, so that the map keeps still from frame to frame
-    draw_scenario(axes, scenario, _covered(scenario, helper, relay=bool(relays[-1])))
-    draw_coverage(axes, helper, scenario.coverage_radius, HELPER_COLOR)
-    draw_flight(axes, path, relays[1:], HELPER_COLOR)
-    _draw_uav(axes, helper, HELPER_LABEL, _HELPER)
-    axes.set_title(f"slot {slot} of {scenario.num_slots}, {'relay' if relays[-1] else 'jamming'}")
+    draw_scenario(axes, scenario, _covered(scenario, paths[-1], relays[-1]))
+    for helper in range(paths.shape[1]):
+        path = paths[:, helper]
+        here = (float(path[-1, 0]), float(path[-1, 1]))
+        draw_coverage(axes, here, scenario.coverage_radius, HELPER_COLOR)
+        draw_flight(axes, path, relays[1:, helper], HELPER_COLOR)
+    _draw_uavs(axes, paths[-1], HELPER_LABEL, _HELPER)
+    told = ", ".join("relay" if relaying else "jamming" for relaying in relays[-1])
+    axes.set_title(f"slot {slot} of {scenario.num_slots}, {told}")
     nodes, _ = axes.get_legend_handles_labels()
     figure.legend(
         handles=[*nodes, *_frame_handles()],
@@ -176,14 +183,15 @@ def render_frame(
     return np.frombuffer(pixels, np.uint8).reshape(height, width, 4)[..., :3].copy()
 
 
-def _covered(scenario: Scenario, helper: Point, *, relay: bool) -> NDArray[np.bool_]:
-    """Eq. 5 with the helper at ``helper``: (U,)."""
+def _covered(
+    scenario: Scenario, helpers: NDArray[np.float64], relays: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Eq. 5 with the helpers at (H, 2) m in modes (H,): the UEs that have a way to send, (U,)."""
     nodes, radius = Nodes.of(scenario, "cpu"), scenario.coverage_radius
-    reached = covered(horizontal_distance(nodes.ue, nodes.legitimate), radius)
-    if relay:
-        to_helper = horizontal_distance(nodes.ue, nodes.legitimate.new_tensor(helper))
-        reached &= covered(to_helper, radius)
-    return reached.numpy()
+    places = nodes.ue.new_tensor(helpers)
+    near = covered(horizontal_distance(nodes.ue.unsqueeze(1), places), radius)
+    way = (near | ~torch.from_numpy(relays)).any(dim=-1)
+    return (way & covered(horizontal_distance(nodes.ue, nodes.legitimate), radius)).numpy()
 
 
 def _draw_ues(axes: Axes, positions: NDArray[np.float64], face: str, label: str) -> None:
@@ -201,9 +209,9 @@ def _draw_ues(axes: Axes, positions: NDArray[np.float64], face: str, label: str)
     )
 
 
-def _draw_uav(axes: Axes, position: Point, label: str, style: dict[str, Any]) -> None:
+def _draw_uavs(axes: Axes, positions: ArrayLike, label: str, style: dict[str, Any]) -> None:
     scaled = style | {"markersize": _size(style["markersize"])}
-    axes.plot(*position, linestyle="", label=label, clip_on=False, **scaled)
+    axes.plot(*np.asarray(positions).T, linestyle="", label=label, clip_on=False, **scaled)
 
 
 _RIM: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.4}  # on dark maps

@@ -1,6 +1,7 @@
 """The helper's flight as a natively batched TorchRL environment."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,20 @@ from torchrl.envs import EnvBase
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import checked
 from hyuav.envs.arguments import (
+    NODES,
     ScenarioLike,
     as_device,
     as_scenarios,
     as_schemes,
     as_seed,
     as_seeds,
+    require_layouts,
     require_shape,
 )
 from hyuav.envs.diagnostics import diagnose, diagnostics_spec
 from hyuav.envs.draws import Draws
 from hyuav.envs.recorder import FlightRecorder
+from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import ModeRule
 from hyuav.physics.scenario import Scenario
@@ -48,6 +52,8 @@ class SecureOffloadingEnv(EnvBase):
         - ``fading`` float32, only where asked for: the factors of unit mean by which the slot's
           fading multiplied the path gains of all links, in the order that
           :class:`hyuav.physics.channel.LinkRow` gives them and ``unflatten`` names.
+        - ``ue_positions`` (U, 2), ``legitimate_position`` (2,) and ``eavesdropper_positions``
+          (E, 2) float32, m, only where layouts are drawn: of the episode.
         - ``diagnostics``, only where asked for, see :mod:`hyuav.envs.diagnostics`.
 
     Action:
@@ -61,20 +67,23 @@ class SecureOffloadingEnv(EnvBase):
 
     Termination: never.
 
-    A reset that is given ``position`` (H, 2) starts there, otherwise at ``helper_starts``.
+    A reset that is given ``position`` (H, 2) starts there, otherwise at ``helper_starts``. Where
+    layouts are drawn, it draws one for each row that it resets.
 
     Args:
         scenario: node positions and parameters, the name of a preset, or UE positions such as
             :func:`hyuav.disk` draws; or a list of these, one for each row of the batch's first
-            dimension, which differ in positions only.
+            dimension, which differ in positions only. Or what draws layouts anew at each reset,
+            such as a :class:`hyuav.LayoutFamily`.
         scheme: "hybrid", "relay", "jamming", or a letter r or j for each helper; or one of these
             for each row of the batch's first dimension.
         batch_size: of the helpers flown at once; where it is left out, a row for each scenario of
             a list.
         device: of all tensors.
-        seed: of the fading and the tasks; the same seed gives the same episode, whether or not
-            diagnostics are asked for. Or one for each row of the batch's first dimension, whose
-            numbers then depend on its own seed alone: rows of equal seeds are equally lucky.
+        seed: of the fading, the tasks and the layouts; the same seed gives the same episode,
+            whether or not diagnostics are asked for. Or one for each row of the batch's first
+            dimension, whose numbers then depend on its own seed alone: rows of equal seeds are
+            equally lucky.
         diagnostics: compute the ``diagnostics`` entry too.
         fading: give the ``fading`` entry too.
 
@@ -91,7 +100,7 @@ class SecureOffloadingEnv(EnvBase):
 
     def __init__(
         self,
-        scenario: ScenarioLike | Sequence[ScenarioLike],
+        scenario: ScenarioLike | Sequence[ScenarioLike] | LayoutGenerator,
         scheme: str | Sequence[str] = "hybrid",
         batch_size: int | Sequence[int] = (),
         device: torch.device | str | None = None,
@@ -99,10 +108,19 @@ class SecureOffloadingEnv(EnvBase):
         diagnostics: bool = False,
         fading: bool = False,
     ) -> None:
-        scenarios, batch = as_scenarios(scenario, batch_size)
+        generator = scenario if isinstance(scenario, LayoutGenerator) else None
+        if generator is not None:
+            require_layouts(generator)
+        fixed = scenario if generator is None else generator.scenario
+        scenarios, batch = as_scenarios(fixed, batch_size)
         super().__init__(device=as_device(device), batch_size=batch)
-        self.scenarios = scenarios
-        self.physics = Physics(self.scenarios[0], self.device, nodes=self._layout())
+        self.scenarios, self.generator = scenarios, generator
+        self.physics = Physics(
+            self.scenarios[0],
+            self.device,
+            nodes=self._layout(),
+            layout_is_known=generator is None,
+        )
         self.schemes = as_schemes(scheme, self.batch_size, self.scenario.num_helpers)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
@@ -127,7 +145,7 @@ class SecureOffloadingEnv(EnvBase):
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that is flown; where the rows differ in positions, that of the first."""
+        """The scenario that is flown; where rows or episodes differ in positions, one of them."""
         return self.physics.scenario
 
     @property
@@ -153,32 +171,38 @@ class SecureOffloadingEnv(EnvBase):
         def numbers(*shape: int) -> Unbounded:
             return Unbounded((*batch, *shape), dtype=torch.float32, device=device)
 
-        def bounded(bound: float, size: int = 2) -> Bounded:
-            shape = (*batch, num_helpers, size)
-            return Bounded(-bound, bound, shape, dtype=torch.float32, device=device)
+        def bounded(bound: float, *shape: int) -> Bounded:
+            return Bounded(-bound, bound, (*batch, *shape), dtype=torch.float32, device=device)
 
         self.observation_spec = Composite(
-            position=bounded(half),
+            position=bounded(half, num_helpers, 2),
             mode=Categorical(2, (*batch, num_helpers), dtype=torch.int64, device=device),
             distances=numbers(num_helpers, num_targets),
             off_map=flags(num_helpers),
             shape=batch,
             device=device,
         )
+        for name, values in self.node_entries(self.physics.nodes).items():
+            self.observation_spec[name] = bounded(half, *values.shape)
         if self.tells_fading:
             self.observation_spec["fading"] = numbers(self.physics.link_row.size)
         if self.diagnostics:
             self.observation_spec["diagnostics"] = diagnostics_spec(batch, self.scenario, device)
         # What a step reads besides the action; a reset may be given it too.
         self.state_spec = Composite(
-            position=self.observation_spec["position"].clone(), shape=batch, device=device
+            {
+                name: self.observation_spec[name].clone()
+                for name in ("position", *self.node_entries(self.physics.nodes))
+            },
+            shape=batch,
+            device=device,
         )
         if self.diagnostics:
             edge_load = self.observation_spec["diagnostics", "edge_load"].clone()
             self.state_spec["diagnostics"] = Composite(
                 edge_load=edge_load, shape=batch, device=device
             )
-        self.action_spec = bounded(1.0, self.scenario.action_size)
+        self.action_spec = bounded(1.0, num_helpers, self.scenario.action_size)
         self.reward_spec = numbers(1)
         self.done_spec = Composite(done=flags(1), terminated=flags(1), shape=batch, device=device)
 
@@ -187,7 +211,8 @@ class SecureOffloadingEnv(EnvBase):
             own: int | tuple[int, ...] = as_seeds(seed, self.batch_size)
         else:
             own = as_seed(seed)
-        self.draws = Draws(self.physics, self.batch_size, own)
+        size = 0 if self.generator is None else self.generator.size
+        self.draws = Draws(self.physics, self.batch_size, own, size)
 
     def render(self, row: int = 0) -> NDArray[np.uint8]:
         """Draw the map and the flight since the last reset, (height, width, 3).
@@ -202,17 +227,19 @@ class SecureOffloadingEnv(EnvBase):
 
         alike = len(self.scenarios) == 1
         own = self.scenario if alike else self.scenarios[row // self.batch_size[1:].numel()]
-        return render_frame(own, *self.recorder.flight(row))
+        flight = self.recorder.flight(row)
+        own = dataclasses.replace(own, **self.recorder.nodes(row))
+        return render_frame(own, *flight)
 
     def _reset(self, tensordict: TensorDictBase | None, **_: Any) -> TensorDictBase:
         position = self.start(tensordict)
         # What is found at the start is what a slot brings in which the helpers stay there.
         staying = Control(torch.zeros_like(position), self._mode_rule)
-        after_reset = self._slot(position, staying)[0]
+        after_reset = self._slot(self._nodes(self.drawn_layouts(), position), staying)[0]
         if self.diagnostics:
             after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
         chosen = None if tensordict is None else tensordict.get("_reset", None)
-        self.recorder.start(after_reset["position"], after_reset["mode"], chosen)
+        self.recorder.start(after_reset, chosen)
         return after_reset
 
     def start(self, tensordict: TensorDictBase | None) -> Tensor:
@@ -222,6 +249,27 @@ class SecureOffloadingEnv(EnvBase):
             starts = self.physics.nodes.helper
             return starts.expand(*self.batch_size, *starts.shape[-2:]).clone()
         return self._checked_position(position)
+
+    def drawn_layouts(self) -> dict[str, Tensor]:
+        """The nodes of episodes that begin now, by their entries; none where they are fixed."""
+        if self.generator is None:
+            return {}
+        entries = self.node_entries(self.generator.draw(self.draws.layouts()))
+        shapes = {name: self.observation_spec[name].shape for name in entries}
+        return {name: values.float().expand(shapes[name]) for name, values in entries.items()}
+
+    def node_entries(self, nodes: Nodes) -> dict[str, Tensor]:
+        """What is told of nodes that do not fly, by entry: all where they are drawn, or nothing."""
+        if self.generator is None:
+            return {}
+        return dict(zip(NODES, (nodes.ue, nodes.legitimate, nodes.eavesdropper), strict=True))
+
+    def _nodes(self, entries: Mapping[str, Tensor] | TensorDictBase, position: Tensor) -> Nodes:
+        """All nodes of a slot, with the helpers at ``position``."""
+        if self.generator is None:
+            return self.physics.nodes._replace(helper=position)
+        ue, legitimate, eavesdropper = (entries[name] for name in NODES)
+        return Nodes(ue, legitimate, position, eavesdropper)
 
     def _checked_position(self, position: Tensor) -> Tensor:
         half = self.scenario.map_side / 2
@@ -238,7 +286,7 @@ class SecureOffloadingEnv(EnvBase):
         require_shape("action", action, (*position.shape[:-1], self.scenario.action_size))
         action = action.to(torch.float32)  # as specified, whatever is given
         control = self.physics.control(action, self._norm_limit, self._mode_rule)
-        after, outcome, tasks = self._slot(position, control)
+        after, outcome, tasks = self._slot(self._nodes(tensordict, position), control)
         after["reward"] = reward = outcome.sum_rate
         after["done"] = torch.zeros_like(reward, dtype=torch.bool)
         after["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
@@ -247,23 +295,23 @@ class SecureOffloadingEnv(EnvBase):
             edge_load = tensordict["diagnostics", "edge_load"]
             after["diagnostics"] = diagnose(self.scenario, outcome, tasks, edge_load)
         if isinstance(self.draws, Draws):  # else a graph is recorded, and nothing is flown
-            self.recorder.add(after["position"], after["mode"])
+            self.recorder.add(after)
         return after
 
     def _slot(
-        self, position: Tensor, control: Control
+        self, nodes: Nodes, control: Control
     ) -> tuple[TensorDictBase, SlotOutcome, Tasks | None]:
         """Fly one slot: what is observed, what the slot brought, and its tasks."""
         fading = self.draws.fading()
         tasks = self.draws.tasks() if self.draws_tasks else None
         links = None if fading is None else self.physics.link_row.unflatten(fading)
-        nodes = self.physics.nodes._replace(helper=position)
         outcome = slot(self.physics, nodes, control, links, tasks)
         observed = TensorDict(
             position=outcome.nodes.helper,
             mode=outcome.relays.to(torch.int64),
             distances=outcome.distances,
             off_map=outcome.off_map,
+            **self.node_entries(outcome.nodes),
             batch_size=self.batch_size,
             device=self.device,
         )

@@ -12,6 +12,7 @@ from hyuav.envs.arguments import ScenarioLike
 from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.observation import JointView
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
+from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.scenario import Scenario
 
 WITHIN = 1.0 - 1e-6
@@ -76,7 +77,7 @@ class Geofence(Transform):
 
 
 def make_env(
-    scenario: ScenarioLike | Sequence[ScenarioLike],
+    scenario: ScenarioLike | Sequence[ScenarioLike] | LayoutGenerator,
     scheme: str | Sequence[str] = "hybrid",
     batch_size: int | Sequence[int] = (),
     device: torch.device | str | None = None,

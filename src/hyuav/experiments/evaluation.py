@@ -20,6 +20,7 @@ from hyuav._support.errors import InputError, InputTypeError, rejection, require
 from hyuav._support.files import write_durably
 from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNumber, parameter
 from hyuav._support.randomness import derived_seed
+from hyuav.envs.arguments import as_scenario
 from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
 from hyuav.learning.policy import Policy
@@ -87,6 +88,7 @@ def evaluate(
             of UEs.
         InputTypeError: something else than a policy.
     """
+    scenario = as_scenario(scenario)
     for scheme in policies:
         require_choice("scheme", scheme, SCHEMES)
     if not policies:

@@ -79,6 +79,11 @@ class AlgorithmParameters(Parameters, ABC):
     action_scale: ActionScale = parameter(1.0)
     """Of the tanh that ends the actor; see :class:`hyuav.learning.networks.ScaledTanh`."""
 
+    @property
+    def knows_layout(self) -> bool:
+        """Whether a part of it must know where nodes are before it flies."""
+        return self.afterstate
+
     @abstractmethod
     def build(self, learners: int, scenario: Scenario) -> "Algorithm":
         """Make the networks, their targets, the loss, the optimizers and the exploration.

@@ -46,6 +46,7 @@ from hyuav.learning.weights import (
     load_weights,
     replace_learners,
 )
+from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.modes import ModeRuleName
 from hyuav.physics.scenario import Scenario
 
@@ -73,7 +74,8 @@ class Cohort:
     """N learners that share a horizon and nothing else.
 
     Args:
-        scenario: node positions and parameters, with the learners' horizon.
+        scenario: node positions and parameters, with the learners' horizon; or what draws layouts
+            anew in each episode.
         learners: their schemes and seeds.
         parameters: which algorithm, with its hyperparameters.
         replay_size: transitions kept of each learner.
@@ -83,23 +85,24 @@ class Cohort:
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: Scenario | LayoutGenerator,
         learners: Sequence[Learner],
         parameters: AlgorithmParameters,
         replay_size: int,
         batch_size: int,
         device: torch.device | str | None,
     ) -> None:
-        self.scenario, self.learners = scenario, tuple(learners)
+        self._flown, self.learners = scenario, tuple(learners)
         self._parameters, self._transitions = parameters, parameters.transitions
         seeds = [learner.seed for learner in learners]
         schemes = [learner.scheme for learner in learners]
         self.env = make_env(
             scenario, schemes, (len(seeds),), device, seeds, **parameters.environment
         )
+        self.scenario: Scenario = self.env.base_env.scenario
         # Line 1: actor mu, critic Q, their targets and the replay buffer B.
         with made_on(self.env.device):
-            algorithm = parameters.build(len(seeds), scenario)
+            algorithm = parameters.build(len(seeds), self.scenario)
             draw_weights(algorithm.loss, seeds, "weights")
             self.algorithm = parameters.guided(algorithm, self.env, seeds)
         for step in self.algorithm.steps:
@@ -259,7 +262,7 @@ class Cohort:
             as :func:`hyuav.learning.policy.fly_noise_free`.
         """
         env = make_env(
-            self.scenario,
+            self._flown,
             self.env.base_env.schemes if scheme is None else scheme,
             (len(self.learners), episodes),
             self.env.device,

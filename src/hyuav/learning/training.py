@@ -34,6 +34,7 @@ from hyuav.learning.memory import require_memory
 from hyuav.learning.policy import NoiseFreeReturn, Policy, learned_policy
 from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learners
+from hyuav.physics.generators import LayoutGenerator, over_horizon
 from hyuav.physics.scenario import Scenario
 
 COMPILE_SECONDS = 20.0
@@ -101,20 +102,22 @@ class Training:
     whatever the process does besides, up to the rounding of differently arranged sums.
 
     Args:
-        scenario: node positions and parameters.
+        scenario: node positions and parameters; or what draws layouts anew in each episode, such as
+            a :class:`hyuav.LayoutFamily`, for algorithms that need not know them beforehand.
         learners: one or more.
         algorithm: which one, with its hyperparameters.
         parameters: how long and on what to learn.
         device: of all tensors.
 
     Raises:
-        InputError: an unknown device; later, where it must be compiled, no working compiler.
+        InputError: an unknown device, an algorithm that knows one layout where layouts are drawn;
+            later, where it must be compiled, no working compiler.
         InputTypeError: an argument of the wrong type.
     """
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: Scenario | LayoutGenerator,
         learners: Sequence[Learner],
         algorithm: AlgorithmParameters,
         parameters: TrainingParameters,
@@ -127,7 +130,11 @@ class Training:
             raise InputTypeError(rejection("learners", learners, "a list of at least one Learner"))
         if not isinstance(algorithm, AlgorithmParameters):
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
-        self.scenario, self.parameters = scenario, parameters
+        if isinstance(scenario, LayoutGenerator) and algorithm.knows_layout:
+            accepted = "one without afterstate and guide, which know one layout, such as DDPG()"
+            raise InputError(rejection("algorithm", type(algorithm).__name__, accepted))
+        fixed = scenario.scenario if isinstance(scenario, LayoutGenerator) else scenario
+        self.scenario, self.parameters = fixed, parameters
         self._algorithm = algorithm
         self.learners = tuple(learners)
         device = as_device(device)
@@ -137,14 +144,14 @@ class Training:
         if parameters.replay_size < algorithm.least_replay(longest):
             accepted = f"at least the {longest} slots of a flight, to keep the best"
             raise InputError(rejection("replay_size", parameters.replay_size, accepted))
-        needs = algorithm.needed_memory(scenario, self.horizons, parameters.sizes)
+        needs = algorithm.needed_memory(fixed, self.horizons, parameters.sizes)
         require_memory(needs, len(self.learners), device)
         self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
         order = [index for members in self._members for index in members]
         self._order = sorted(range(len(order)), key=order.__getitem__)
         self.cohorts = [
             Cohort(
-                dataclasses.replace(scenario, num_slots=self.horizons[members[0]]),
+                over_horizon(scenario, self.horizons[members[0]]),
                 [learners[index] for index in members],
                 algorithm,
                 parameters.replay_size,

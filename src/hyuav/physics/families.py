@@ -1,12 +1,14 @@
-"""Families of layouts by name: what is drawn, and how large it is."""
+"""Layouts by their parameters, which a seed or uniform draws decide."""
 
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
+import torch
 from pydantic import Field
 from pydantic.dataclasses import dataclass
+from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.parameters import (
@@ -16,7 +18,15 @@ from hyuav._support.parameters import (
     checked,
     parameter,
 )
-from hyuav.physics.layout import MOST_UES, NumUEs, Sizes, clusters, disk, random_layout
+from hyuav.physics.layout import (
+    MOST_UES,
+    NumUEs,
+    Sizes,
+    clusters,
+    disk,
+    in_disk,
+    random_layout,
+)
 from hyuav.physics.scenario import Point, Scenario
 
 _NumClusters = Annotated[int, Field(ge=1, le=MOST_UES)]
@@ -31,6 +41,15 @@ class LayoutParameters(Parameters, ABC):
     @abstractmethod
     def draw(self, seed: int) -> tuple[Point, ...]:
         """Draw U positions (x, y) in metres; the same seed draws the same."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """How many uniform draws decide a layout."""
+
+    @abstractmethod
+    def place(self, draws: Tensor) -> Tensor:
+        """Where uniform draws (..., size) from [0, 1) put the UEs: (..., U, 2) m."""
 
     @property
     @abstractmethod
@@ -70,6 +89,15 @@ class DiskLayout(LayoutParameters):
     def draw(self, seed: int) -> tuple[Point, ...]:
         """See :meth:`LayoutParameters.draw`."""
         return disk(self.num_ues, self.radius, self.center, seed=seed)
+
+    @property
+    def size(self) -> int:
+        """See :attr:`LayoutParameters.size`."""
+        return 2 * self.num_ues
+
+    def place(self, draws: Tensor) -> Tensor:
+        """See :meth:`LayoutParameters.place`."""
+        return in_disk(draws.unflatten(-1, (-1, 2)), self.radius, self.center)
 
     @property
     def extent(self) -> float:
@@ -120,6 +148,30 @@ class ClustersLayout(LayoutParameters):
         return clusters(sizes, self.cluster_radius, self.spread, self.center, seed=seed)
 
     @property
+    def size(self) -> int:
+        """See :attr:`LayoutParameters.size`."""
+        return 1 + 2 * sum(self.cluster_sizes)
+
+    def place(self, draws: Tensor) -> Tensor:
+        """See :meth:`LayoutParameters.place`."""
+        sizes = torch.tensor(self.cluster_sizes, device=draws.device)
+        own = torch.arange(len(sizes), device=draws.device).repeat_interleave(sizes)
+        return self.around(draws[..., :1], own / len(sizes), draws[..., 1:])
+
+    def around(self, turn: Tensor, share: Tensor, draws: Tensor) -> Tensor:
+        """UEs (..., U, 2) m in clusters around the circle of this layout.
+
+        Args:
+            turn: (..., 1), of the circle, in whole turns.
+            share: (..., U), how far around it each UE's cluster lies, in whole turns too.
+            draws: (..., 2 U), where in its cluster.
+        """
+        angle = 2 * torch.pi * (turn + share)
+        x = self.center[0] + self.spread * angle.cos()
+        y = self.center[1] + self.spread * angle.sin()
+        return in_disk(draws.unflatten(-1, (-1, 2)), self.cluster_radius, (x, y))
+
+    @property
     def extent(self) -> float:
         """See :attr:`LayoutParameters.extent`."""
         return max(map(abs, self.center)) + self.spread + self.cluster_radius
@@ -132,6 +184,18 @@ class RandomLayout(LayoutParameters):
     def draw(self, seed: int) -> tuple[Point, ...]:
         """See :meth:`LayoutParameters.draw`."""
         return random_layout(seed)
+
+    @property
+    def size(self) -> int:
+        """See :attr:`LayoutParameters.size`."""
+        return 2 + ClustersLayout().size
+
+    def place(self, draws: Tensor) -> Tensor:
+        """See :meth:`LayoutParameters.place`."""
+        kind, first, turn, within = draws.split((1, 1, 1, self.size - 3), dim=-1)
+        second = torch.arange(10, device=draws.device) >= 3 + (5 * first).floor()
+        two = ClustersLayout().around(turn, 0.5 * second, within)
+        return torch.where(kind.unsqueeze(-1) < 0.5, DiskLayout().place(within), two)
 
     @property
     def extent(self) -> float:

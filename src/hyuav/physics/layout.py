@@ -154,6 +154,21 @@ def _disk(
     draws = torch.rand(
         (num_ues, 2), generator=generator, dtype=torch.float64, device=generator.device
     )
-    distance, angle = radius * draws[:, 0].sqrt(), 2 * torch.pi * draws[:, 1]
-    x, y = center[0] + distance * angle.cos(), center[1] + distance * angle.sin()
+    x, y = in_disk(draws, radius, center).unbind(dim=-1)
     return tuple(zip(x.tolist(), y.tolist(), strict=True))
+
+
+def in_disk(draws: Tensor, radius: float, center: tuple[Tensor | float, Tensor | float]) -> Tensor:
+    """Where uniform draws from [0, 1) lie in a disk, uniformly too.
+
+    Args:
+        draws: (..., 2), of the distance and the angle.
+        radius: in m.
+        center: x and y in m, each of shape (...) or one for all.
+
+    Returns:
+        (..., 2) m.
+    """
+    distance, angle = radius * draws[..., 0].sqrt(), 2 * torch.pi * draws[..., 1]
+    x, y = center[0] + distance * angle.cos(), center[1] + distance * angle.sin()
+    return torch.stack([x, y], dim=-1)

@@ -138,6 +138,7 @@ class Physics:
         dtype: float32 or float64.
         nodes: where the nodes are before the first slot, where that is not the scenario's layout
             alone; of the scenario's counts.
+        layout_is_known: False where layouts are drawn, and these nodes are only an example.
 
     Warns:
         ScenarioWarning: a mode can never earn anything; once in a process.
@@ -149,6 +150,8 @@ class Physics:
         device: torch.device | str | None = None,
         dtype: torch.dtype = torch.float32,
         nodes: Nodes | None = None,
+        *,
+        layout_is_known: bool = True,
     ) -> None:
         self.scenario = scenario
         self.device = torch.device(device) if device is not None else torch.device("cpu")
@@ -162,7 +165,8 @@ class Physics:
         self.edge_can_saturate = energy.edge_can_saturate(scenario)
         """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
         self._standing = self._stand(self.nodes)
-        warn_of_what_cannot_earn(scenario, self._standing.ue_to_legitimate)
+        known = self._standing.ue_to_legitimate if layout_is_known else None
+        warn_of_what_cannot_earn(scenario, known)
 
     def _tensor(self, values: object) -> Tensor:
         return torch.tensor(values, dtype=self.dtype, device=self.device)

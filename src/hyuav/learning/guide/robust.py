@@ -39,6 +39,11 @@ class Robust(AlgorithmParameters):
     guide: Guide | None = parameter(Guide())
     """What guides the learners while they train; null for nothing."""
 
+    @property
+    def knows_layout(self) -> bool:
+        """See :attr:`AlgorithmParameters.knows_layout`: a guide imagines flights."""
+        return super().knows_layout or self.guide is not None
+
     def guided(self, algorithm: Algorithm, env: TransformedEnv, seeds: Sequence[int]) -> Algorithm:
         """See :meth:`AlgorithmParameters.guided`."""
         if self.guide is None:
