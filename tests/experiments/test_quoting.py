@@ -28,7 +28,7 @@ print(json.dumps(read))
 @given(ODD | PRINTABLE)
 def test_any_text_in_quotation_marks_is_read_as_it_is(text: str) -> None:
     read = OverridesParser.create().parse_override(f"run={in_quotes(text)}").value()
-    assert OmegaConf.to_container(OmegaConf.create({"run": read}), resolve=True)["run"] == text
+    assert OmegaConf.create({"run": read}).run == text
 
 
 @pytest.mark.parametrize(

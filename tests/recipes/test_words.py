@@ -74,6 +74,11 @@ def test_a_word_that_cannot_be_read_is_told_as_it_is_written(
     assert told.endswith(f": {line}\n")
 
 
+def test_the_home_is_told_in_full(refusal: Refusal) -> None:
+    told = refusal("evaluate", "run=~/runs/one")
+    assert told.endswith(f"quotation marks: 'run=\"{Path.home() / 'runs' / 'one'}\"'\n")
+
+
 def test_a_word_with_dashes_and_one_in_capitals_are_told_too(refusal: Refusal) -> None:
     told = refusal("train", "--seed=3")
     assert (

@@ -184,7 +184,8 @@ def _with_quotes(name: str, value: str) -> str | None:
     elif value.startswith(("[", "{", "(", "'", '"')):
         return None
     else:
-        whole = f"{name}={in_quotes(value)}"
+        home = value.startswith("~/")  # which a shell looks up at the beginning of a word alone
+        whole = f"{name}={in_quotes(str(Path(value).expanduser()) if home else value)}"
     return None if _reason_not_to_read(whole) else whole
 
 
