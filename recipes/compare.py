@@ -20,11 +20,12 @@ from rich.console import Console
 
 from hyuav._support.errors import harmless
 from hyuav._support.terminal import print_line
+from hyuav.experiments.command_line import same_call
 from hyuav.experiments.comparison.directory import ComparisonDirectory
 from hyuav.experiments.comparison.plan import Compare, require_libraries
 from hyuav.experiments.comparison.tables import print_tables
 from hyuav.experiments.comparison.work import work_off
-from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
+from hyuav.experiments.configuration import Config, recipe, section, telling_how_to_go_on
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.experiments.tracking import LoggerParameters, log_comparison
 from hyuav.learning.training import TrainingParameters

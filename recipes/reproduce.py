@@ -38,7 +38,8 @@ from hyuav._support.parameters import (
     parameter,
 )
 from hyuav._support.terminal import make_progress, print_line
-from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
+from hyuav.experiments.command_line import same_call
+from hyuav.experiments.configuration import Config, recipe, section, telling_how_to_go_on
 from hyuav.experiments.elsewhere import horizon_directory
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.experiments.evaluation_table import print_results

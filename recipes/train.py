@@ -33,13 +33,13 @@ from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import (
     Config,
     given,
-    override,
     recipe,
     remove_if_empty,
     section,
     telling_how_to_go_on,
 )
 from hyuav.experiments.initial_weights import saved_weights
+from hyuav.experiments.quoting import override
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train_or_resume

@@ -39,8 +39,11 @@ def recipes_page() -> str:
         "directory to be edited, and `python train.py` then takes the same words. "
         "Anything below can be set by `name=value`, in a section or group by "
         "`section.name=value`; `--cfg job` prints it all, and "
-        "`--config-dir DIR` adds files of your own. The groups `scenario`, `algorithm` and "
-        "`logger` are chosen by a name and changed field by field: "
+        "`GROUP=FILE.yaml` or `--config-dir DIR` brings files of your own. Paths are told from "
+        "where the command is called, whatever `hydra.job.chdir` says; one with `=`, a comma, a "
+        "bracket or a letter outside ASCII stands in quotation marks, which the shell must leave "
+        "alone: `'run=\"runs/lr=0.1\"'`. The groups `scenario`, `algorithm` and `logger` are "
+        "chosen by a name and changed field by field: "
         "[their fields](configuration.md).",
     ]
     for path in sorted(RECIPES.glob("*.py")):

@@ -8,7 +8,8 @@ import pytest
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 
-from hyuav.experiments.configuration import override, same_call
+from hyuav.experiments import command_line
+from hyuav.experiments.command_line import same_call
 
 
 @pytest.mark.parametrize(
@@ -20,17 +21,5 @@ def test_a_job_goes_on_by_its_own_call_also_where_it_was_one_of_several(
     overrides = SimpleNamespace(task=["seed=1", "output=elsewhere"])
     monkeypatch.setattr(HydraConfig, "get", lambda: SimpleNamespace(mode=mode, overrides=overrides))
     monkeypatch.setattr(sys, "argv", ["compare.py", "-q", "seed=0,1", "output=elsewhere"])
+    command_line.remember()
     assert same_call("output", Path("runs/1")) == [*others, "output=runs/1"]
-
-
-@pytest.mark.parametrize(
-    ("path", "told"),
-    [
-        (Path.cwd() / "runs" / "one", "run=runs/one"),
-        (Path("/somewhere/else"), "run=/somewhere/else"),
-        (Path("a b/c"), 'run="a b/c"'),
-        (Path("name"), 'run="name"'),
-    ],
-)
-def test_a_path_is_told_as_the_command_line_takes_it(path: Path, told: str) -> None:
-    assert override("run", path) == told

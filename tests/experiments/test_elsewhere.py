@@ -115,6 +115,8 @@ def test_a_main_job_is_a_run_though_another_is_in_it(tmp_path: Path) -> None:
     run(tmp_path, (None,))
     run(tmp_path / "as_in_paper", (None,))
     assert [own.path for own in runs_in(tmp_path)] == [tmp_path]
+    (tmp_path / "config.yaml").write_text("[damaged")
+    assert [own.path for own in runs_in(tmp_path)] == [tmp_path]
 
 
 def test_the_trained_scenario_is_over_a_horizon_of_the_learners() -> None:

@@ -283,7 +283,7 @@ REFUSALS = [
     (["train", "device=tpu9"], "device = 'tpu9': expected a device of this machine"),
     (["train", "warm_start=nowhere.pt"], "checkpoint = 'nowhere.pt': expected a checkpoint"),
     (["train", "scenario.ue_positions=[[1,2]"], "no viable alternative at input"),
-    (["train", "=3"], "Config group override must be a string"),
+    (["train", "=3"], "'=3': expected NAME=VALUE"),
     (["train", "--foo"], "unrecognized arguments: --foo"),
     (["train", "hydra.run.dir=/proc/nowhere"], "No such file or directory: '/proc/nowhere'"),
     (["train", "algorithm.actor_learning_rate=9"], "expected a number in [0, 1]"),

@@ -79,10 +79,19 @@ def rejection(name: str, value: object, accepted: str) -> str:
     return f"{name} = {brief(value)}: expected {accepted}"
 
 
+def most_similar(value: object, choices: Iterable[str]) -> str | None:
+    """The choice that a value may have been meant for; None where none is much like it."""
+    if not isinstance(value, str):
+        return None
+    by_letters = {choice.lower(): choice for choice in choices}
+    similar = difflib.get_close_matches(value[:80].lower(), by_letters, n=1, cutoff=0.7)
+    return by_letters[similar[0]] if similar else None
+
+
 def did_you_mean(value: object, choices: Iterable[str]) -> str:
     """A hint at the most similar choice, to be put behind a line; empty if there is none."""
-    similar = difflib.get_close_matches(value, choices, n=1) if isinstance(value, str) else []
-    return f" (did you mean {similar[0]!r}?)" if similar else ""
+    similar = most_similar(value, choices)
+    return f" (did you mean {similar!r}?)" if similar else ""
 
 
 def require_choice(name: str, value: object, choices: Iterable[str]) -> None:

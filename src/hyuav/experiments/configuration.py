@@ -3,46 +3,36 @@
 import contextlib
 import dataclasses
 import os
-import re
 import shlex
 import signal
 import sys
-from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import hydra
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
+from hydra.errors import HydraException
 from hydra.types import RunMode
-from omegaconf import MISSING, DictConfig, OmegaConf
-from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
-from hyuav._support.errors import (
-    Halted,
-    InputError,
-    Interrupted,
-    brief,
-    cause,
-    did_you_mean,
-    harmless,
-    one_line,
-    rejection,
-    require_choice,
-)
+from hyuav._support.errors import Halted, InputError, Interrupted, cause, harmless, one_line
 from hyuav._support.interruption import interrupted_by_sigterm
-from hyuav._support.parameters import Parameters, mapping, refuse_unknown, unknown_field
+from hyuav._support.parameters import Parameters, mapping
 from hyuav._support.start import loaded, program
+from hyuav.experiments.command_line import remember
 from hyuav.experiments.configuration_files import read_files_as_data
 from hyuav.experiments.elsewhere import AS_TRAINED, as_trained
+from hyuav.experiments.mistakes import Vocabulary, explain, members_of
 from hyuav.experiments.own_algorithms import run_named, with_own
 from hyuav.experiments.scenarios import NAMES, offered
 from hyuav.experiments.tracking import LoggerParameters, loggers
 from hyuav.experiments.usage import usage
-from hyuav.learning.registry import ALGORITHMS, file_name, run_own
+from hyuav.learning.registry import ALGORITHMS, file_name, find, run_own
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
 """In the pattern of a run's directory, when the command was called."""
@@ -103,6 +93,7 @@ def recipe(
     """
     node = _node(options, groups, sections, run_directory)
     names = [*options().to_dict(), *sections, *groups]
+    vocabulary = partial(Vocabulary, node, groups)
     ConfigStore.instance().store(name=name, node=node)
 
     def decorate(function: Callable[[Config, Path], None]) -> Callable[[], None]:
@@ -116,7 +107,7 @@ def recipe(
                 run_own(reference)
             hint = "" if NOW in run_directory else ", and the same command goes on"
             with _job(hint) as directory:
-                function(_plain(config, names, groups, sections), directory)
+                function(_plain(config, names, groups, sections, vocabulary), directory)
 
         # Or Hydra would take this package's folders for groups: hyuav/viz for ``viz=...``.
         run.__module__ = "__main__"
@@ -127,18 +118,19 @@ def recipe(
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             register(groups)
             if not {"-h", "--help"}.isdisjoint(sys.argv[1:]):
-                offered = {group: (member, _members(group)) for group, member in groups.items()}
+                offered = {group: (member, members_of(group)) for group, member in groups.items()}
                 logged = {LOGGER: LoggerParameters.defaults()} if LOGGER in groups else {}
                 fields, names_of = {**node, **logged}, [*sections, *logged]
                 told = usage(name, function.__globals__["__doc__"], fields, offered, names_of)
                 sys.stdout.write(f"{told}\n")  # at once, as what is piped to may end early
                 return
-            with _ending_in_one_line(lambda: composed):
+            with _ending_in_one_line(vocabulary, lambda: composed):
                 loaded()  # from here on an interruption is answered
+                remember()
                 references = run_named(chosen="algorithm" in groups)
                 register(groups)
-                _refuse_overrides(node, groups)
-                read_files_as_data(groups)
+                read_files_as_data(groups, _completed)
+                vocabulary().refuse(sys.argv[1:])
                 hydra.main(version_base=None, config_path=None, config_name=name)(run)()
 
         return command
@@ -153,9 +145,11 @@ def _job(hint: str) -> Iterator[Path]:
     Args:
         hint: on how to go on after a halt.
     """
-    directory = Path(HydraConfig.get().runtime.output_dir)
+    runtime = mapping("runtime", OmegaConf.to_container(HydraConfig.get().runtime))  # with any $
+    directory = Path(runtime["output_dir"])
     try:
         with _halting(hint):
+            os.chdir(runtime["cwd"])  # whatever hydra.job.chdir says: paths keep their meaning
             yield directory
     except (InputError, Halted) as error:
         remove_if_empty(directory)
@@ -193,10 +187,13 @@ def _node(
 
 
 @contextmanager
-def _ending_in_one_line(composed: Callable[[], bool]) -> Iterator[None]:
+def _ending_in_one_line(
+    vocabulary: Callable[[], Vocabulary], composed: Callable[[], bool]
+) -> Iterator[None]:
     """End the command with one line on what the user has to change or to know.
 
     Args:
+        vocabulary: of the recipe, as far as it is known.
         composed: whether Hydra has accepted the command line; from then on whatever is raised but
             refusals is a fault of the program, to be seen whole.
     """
@@ -209,7 +206,7 @@ def _ending_in_one_line(composed: Callable[[], bool]) -> Iterator[None]:
     except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
         if composed() and not isinstance(error, InputError):
             raise
-        _end(explain(error), 2)
+        _end(explain(error, vocabulary()), 2)
     except KeyboardInterrupt as error:
         print(harmless(str(error)) or "interrupted", file=sys.stderr)
         sys.exit(128 + (error.signal if isinstance(error, Interrupted) else signal.SIGINT))
@@ -217,43 +214,37 @@ def _ending_in_one_line(composed: Callable[[], bool]) -> Iterator[None]:
         _end(str(error), 1)
 
 
-def _refuse_overrides(node: Mapping[str, Any], groups: Iterable[str]) -> None:
-    """Refuse what Hydra accepts or does not explain.
+def _completed(group: str, member: str, values: Config) -> Config:
+    """A file's values, with the defaults of what it leaves out, so that these can be set too.
+
+    Args:
+        group: of the file.
+        member: what the file is called in it.
+        values: in the file.
 
     Raises:
-        InputError: an override of what would lie below a single value or a list; a group without
-            a member, or with a list of them; several jobs where there is no directory for each.
+        InputError: the file is of an unknown algorithm.
     """
-    repository = ConfigStore.instance().repo
-    members = {group: [each.node for each in repository[group].values()] for group in groups}
-    known = {**node, **{group: dict(ChainMap(*nodes)) for group, nodes in members.items()}}
-    once = node["hydra"]["run"]["dir"] == "."
-    for argument in sys.argv[1:]:
-        if once and argument in ("-m", "--multirun"):
-            raise InputError(f"{argument}: this recipe does a single job: leave it out")
-        name, _, value = argument.partition("=")
-        entry = name.lstrip("+~")
-        if entry in groups and (name.startswith("~") or value.startswith("[")):
-            require_choice(name, value, _members(entry))
-        path = entry.split(".")
-        below: Any = known
-        for depth, key in enumerate(path):
-            if not isinstance(below, Mapping):
-                whole = ".".join(path[:depth])
-                raise InputError(f"{brief(argument)}: {whole} has no fields: set {whole}=...")
-            if key not in below:
-                break
-            below = below[key]
-
-
-def _members(group: str) -> list[str]:
-    """What a group offers, by name."""
-    offered = ConfigStore.instance().repo[group]
-    return sorted(member.removesuffix(".yaml") for member in offered)
+    if group == "algorithm":
+        defaults = find(values.get("name", member))().to_dict()
+    elif group == LOGGER:
+        defaults = LoggerParameters.defaults()
+    else:
+        defaults = offered(str(values.get("layout", NAMES[0])))
+        defaults.pop("ue_positions", None)
+    completed = {**defaults, **values}
+    for name, own in defaults.items():
+        if isinstance(own, dict) and isinstance(values.get(name), dict):
+            completed[name] = {**own, **values[name]}
+    return completed
 
 
 def _plain(
-    config: DictConfig, names: Iterable[str], groups: Iterable[str], sections: Iterable[str]
+    config: DictConfig,
+    names: Iterable[str],
+    groups: Iterable[str],
+    sections: Iterable[str],
+    vocabulary: Callable[[], Vocabulary],
 ) -> Config:
     """The configuration in plain values, with exactly the entries that are named.
 
@@ -263,9 +254,11 @@ def _plain(
     try:
         plain = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
     except OmegaConfBaseException as error:
-        raise InputError(explain(error)) from None
+        raise InputError(explain(error, vocabulary())) from None
     values = mapping("configuration", plain)
-    refuse_unknown("configuration", values, names)
+    for name in values:
+        if name not in names:
+            raise vocabulary().unknown(name)
     for name in names:
         if name not in values:
             raise InputError(f"configuration: {name} is missing")
@@ -322,36 +315,6 @@ def telling_how_to_go_on(
         raise Halted(f"{error}; {hint}") from None
 
 
-def same_call(name: str, path: Path) -> list[str]:
-    """The overrides of this call, with an entry set to a path.
-
-    Args:
-        name: of the entry.
-        path: as :func:`override` takes it.
-    """
-    config = HydraConfig.get()
-    one_of_several = config.mode is RunMode.MULTIRUN  # which goes on by itself
-    given = config.overrides.task if one_of_several else sys.argv[1:]
-    others = (each for each in given if not each.startswith(f"{name}="))
-    return [*others, override(name, path)]
-
-
-def override(name: str, path: Path) -> str:
-    """What sets an entry to a path on the command line, in quotation marks where it needs them.
-
-    Args:
-        name: of the entry.
-        path: told from the working directory if it is below.
-    """
-    absolute = path.absolute()
-    below = absolute.is_relative_to(Path.cwd())
-    value = str(absolute.relative_to(Path.cwd()) if below else absolute)
-    if not re.fullmatch(r"[A-Za-z./_][\w./:+-]*/[\w./:+-]*", value):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        value = f'"{escaped}"'
-    return f"{name}={value}"
-
-
 def section(config: Config, parameters: type[Record]) -> Record:
     """Read a record from the entries of a configuration that bear its fields' names.
 
@@ -360,27 +323,6 @@ def section(config: Config, parameters: type[Record]) -> Record:
     """
     names = [field.name for field in dataclasses.fields(parameters)]
     return parameters.from_dict({name: config[name] for name in names})
-
-
-def explain(error: Exception) -> str:
-    """One line that says what was wrong and what is accepted."""
-    reason = error.__cause__
-    if isinstance(error, MissingConfigException) and error.options is not None:
-        group, _, member = str(error.missing_cfg_file).rpartition("/")
-        hint = did_you_mean(member, error.options)
-        return rejection(group, member, f"one of {', '.join(error.options)}{hint}")
-    if isinstance(error, ConfigCompositionException) and isinstance(reason, OmegaConfBaseException):
-        known = reason.parent_node
-        if reason.full_key is not None and isinstance(known, DictConfig):
-            owner, _, key = reason.full_key.rpartition(".")
-            if key not in known:
-                names = [str(name) for name in known if name != "hydra"]
-                return str(unknown_field(owner or "configuration", key, names))
-        error = reason
-    if isinstance(error, MissingMandatoryValue):
-        return rejection(str(error.full_key), MISSING, "a value")
-    text = str(error).split("\n    full_key")[0].split("\nSee https")[0]
-    return one_line(text)
 
 
 @contextmanager

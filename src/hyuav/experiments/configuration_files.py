@@ -1,8 +1,8 @@
-"""Files of ``--config-dir`` for Hydra as data: nothing in them is run, looked up or obeyed."""
+"""The user's YAML files for Hydra as data: nothing in them is run, looked up or obeyed."""
 
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -15,8 +15,24 @@ from hyuav._support.yaml_files import read_yaml
 ORDERS = ("defaults", "hydra", "_target_")
 """Names under which Hydra takes orders: what else to read, where to write, what to call."""
 
+Complete = Callable[[str, str, dict[str, Any]], dict[str, Any]]
+"""Adds to the values of a file, a group's member of a name, the defaults of what it leaves out."""
 
-def read_files_as_data(groups: Iterable[str]) -> None:
+_PATH = re.compile(r"""(["'])(?P<quoted>.+?\.ya?ml)\1|[^\s,\[\]()*'"]+\.ya?ml""")
+
+_CHOSEN: dict[str, str] = {}
+"""Overrides that choose a file by the name that Hydra knows, and as they were typed."""
+
+_SEARCHED: list[str] = []
+"""The option that names the directory of files, where there is one."""
+
+
+def choosing_files(overrides: Sequence[str]) -> list[str]:
+    """Overrides of a job as words of a command line, which chooses the same files."""
+    return [*_SEARCHED, *(_CHOSEN.get(each, each) for each in overrides)]
+
+
+def read_files_as_data(groups: Iterable[str], complete: Complete) -> None:
     """Put the files that the command line chooses into Hydra's store, and let it see no directory.
 
     Hydra would let a file call any function (``hydra.callbacks``), write anywhere
@@ -24,7 +40,9 @@ def read_files_as_data(groups: Iterable[str]) -> None:
     a scenario that somebody sent.
 
     Args:
-        groups: whose members may be files, ``DIR/GROUP/NAME.yaml``.
+        groups: whose members may be files, ``DIR/GROUP/NAME.yaml`` or any that is named by its
+            path, ``GROUP=FILE.yaml``.
+        complete: what the files hold.
 
     Raises:
         InputError: no such directory, a chosen file that cannot be read or holds more than plain
@@ -38,9 +56,13 @@ def read_files_as_data(groups: Iterable[str]) -> None:
     if searched or options["config_path"]:
         raise InputError("files are read from --config-dir DIR alone")
     directory = options.pop("config_dir")
-    if directory is not None:
-        for group in groups:
-            _store_members(Path(directory), group, overrides)
+    _SEARCHED[:] = [] if directory is None else ["--config-dir", directory]
+    _CHOSEN.clear()
+    for group in groups:
+        if directory is not None:
+            _store_members(Path(directory), group, overrides, complete)
+        members = None if directory is None else Path(directory) / group
+        overrides = [_with_paths_stored(each, group, members, complete) for each in overrides]
     sys.argv[1:] = overrides
     for name, value in options.items():
         if value is not None and value is not False:
@@ -50,10 +72,42 @@ def read_files_as_data(groups: Iterable[str]) -> None:
 
 def _refuse(message: str) -> NoReturn:
     """Answer in one line, without the usage that Hydra would print first."""
-    raise InputError(message)
+    hint = " (NAME=VALUE is written without dashes)" if "unrecognized" in message else ""
+    raise InputError(f"{message}{hint}")
 
 
-def _store_members(directory: Path, group: str, overrides: Iterable[str]) -> None:
+def _with_paths_stored(override: str, group: str, members: Path | None, complete: Complete) -> str:
+    """An override in which the names of members stand for the paths of files.
+
+    Args:
+        override: any of the command line.
+        group: whose members it may choose.
+        members: directory of files that are members already.
+        complete: what a file holds.
+    """
+    name, _, value = override.partition("=")
+    if name.lstrip("+") != group:
+        return override
+
+    def stored(found: re.Match[str]) -> str:
+        path = Path(found["quoted"] or found[0])
+        if members is not None and (members / path).is_file():
+            return found[0]
+        member = re.sub(r"^(?=[0-9])|[^0-9A-Za-z_-]+", "_", path.stem)
+        typed = f"{group}={found[0]}"
+        if _CHOSEN.setdefault(f"{group}={member}", typed) != typed:
+            raise InputError(rejection(group, value, "files of different names"))
+        node = {"name": member, **complete(group, member, _read(path))}
+        ConfigStore.instance().store(group=group, name=member, node=node)
+        return member
+
+    whole = f'"{value}"' if _PATH.search(value) and Path(value).is_file() else value
+    return f"{name}={_PATH.sub(stored, whole)}"
+
+
+def _store_members(
+    directory: Path, group: str, overrides: Iterable[str], complete: Complete
+) -> None:
     """Offer the files of a group; one that is not chosen may be whatever it is."""
     if not directory.is_dir():
         raise InputError(rejection("--config-dir", str(directory), "a directory"))
@@ -64,7 +118,7 @@ def _store_members(directory: Path, group: str, overrides: Iterable[str]) -> Non
     for path in sorted((directory / group).rglob("*.yaml")):
         place = path.relative_to(directory / group).with_suffix("")
         try:
-            node = _read(path)
+            node = complete(group, str(place), _read(path))
         except InputError:
             if chosen & {str(place), f"{place}.yaml", "glob"}:
                 raise

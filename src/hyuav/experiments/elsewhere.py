@@ -35,24 +35,24 @@ def runs_in(path: str | Path) -> list[RunDirectory]:
             which is refused by whoever reads it.
     """
     directory = Path(path)
-    if _is_run(directory):
+    begun, learners = (directory / "config.yaml").exists(), _learners(directory)
+    if begun and not isinstance(learners, int):
         return [RunDirectory(directory)]
     inside = [
         file.parent
-        for pattern in ("*/config.yaml", "shards/*/config.yaml")
-        for file in directory.glob(pattern)
-        if file.parent.suffix != ".partial" and _is_run(file.parent)
+        for file in directory.glob("shards/*/config.yaml" if begun else "*/config.yaml")
+        if file.parent.suffix != ".partial" and isinstance(_learners(file.parent), list)
     ]
     ordered = sorted(inside, key=lambda own: _with_numbers(own.name))
     return [RunDirectory(own) for own in ordered or [directory]]
 
 
-def _is_run(directory: Path) -> bool:
-    """Whether a training is configured there; a comparison tells the number of its learners."""
+def _learners(directory: Path) -> object:
+    """As a ``config.yaml`` has them: a run's own, or how many each of a comparison's has."""
     try:
-        return isinstance(read_yaml(directory / "config.yaml").get("learners"), list)
+        return read_yaml(directory / "config.yaml").get("learners")
     except InputError:
-        return False
+        return None
 
 
 def _with_numbers(name: str) -> list[str | int]:
