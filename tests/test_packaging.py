@@ -155,5 +155,15 @@ def test_this_python_is_one_of_those_stated() -> None:
 
 
 def test_the_extras_are_there() -> None:
-    extras = {"bench", "cluster", "dashboard", "docs", "dev", "sb3", "video"}
+    extras = {
+        "bench",
+        "cluster",
+        "dashboard",
+        "docs",
+        "dev",
+        "export",
+        "sb3",
+        "tensorboard",
+        "video",
+    }
     assert extras == set(PROJECT["optional-dependencies"])

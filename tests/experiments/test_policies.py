@@ -1,10 +1,13 @@
+import dataclasses
 from pathlib import Path
+from typing import Any
 
 import pytest
+from torch import nn
 
-from hyuav import Policy
+from hyuav import InputError, Policy
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
-from hyuav.experiments.policies import learned_policies, reference_policies
+from hyuav.experiments.policies import learned_policies, reference_policies, require_fit
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.train import train
 from sample_runs import ONE_OF_EACH, SILENT, UNLOGGED
@@ -21,6 +24,24 @@ def test_a_runs_actors_become_the_papers_schemes(tmp_path: Path) -> None:
         "re_ot": 2,
         "ja_ot": 2,
     }
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"ue_positions": ((0.0, 0.0),)}, "number of UEs = 1: expected 10"),
+        ({"helper_starts": ((0.0, 0.0), (9.0, 0.0))}, "number of helpers = 2: expected 1"),
+        ({"eavesdropper_positions": ((0.0, 0.0),) * 3}, "number of eavesdroppers = 3: expected 1"),
+        ({"power_control": True}, "power_control = True: expected False"),
+    ],
+)
+def test_a_scenario_in_which_a_policy_cannot_fly_is_refused(
+    changes: dict[str, Any], line: str
+) -> None:
+    policy, scenario = Policy(nn.Linear(15, 2), ONE_OF_EACH.scenario), ONE_OF_EACH.scenario
+    require_fit(policy, scenario)
+    with pytest.raises(InputError, match=f"^{line}, for which the checkpoint was trained$"):
+        require_fit(policy, dataclasses.replace(scenario, **changes))
 
 
 def test_an_actor_earns_in_the_evaluation_what_it_earned_in_training(tmp_path: Path) -> None:

@@ -58,6 +58,28 @@ def test_what_is_asked_takes_the_place_of_what_was_in_training() -> None:
     assert (env.reset()["mode"] == 1).all()
 
 
+MANY = dataclasses.replace(
+    SCENARIO,
+    helper_starts=((-60.0, -60.0), (50.0, 0.0)),
+    eavesdropper_positions=((-70.0, -70.0), (70.0, 70.0), (0.0, 70.0)),
+    power_control=True,
+)
+
+
+@pytest.mark.parametrize("name", ["ddpg", "td3", "sac"])
+def test_a_policy_steers_several_helpers_and_their_power(name: str, tmp_path: Path) -> None:
+    policy = untrained(name, scenario=MANY)
+    flown = policy.make_env(batch_size=(3,), seed=0).rollout(4, policy)
+    assert flown["action"].shape == (3, 4, 6)
+    observed = flown["observation"]
+    torch.testing.assert_close(policy.act(observed), flown["action"])
+    policy.export(tmp_path / "policy.pt2")
+    exported = torch.export.load(tmp_path / "policy.pt2").module()(observed[0])
+    torch.testing.assert_close(exported, flown["action"][0])
+    with pytest.raises(InputError, match=r"10 UEs, 3 eavesdropper\(s\), 2 helper\(s\) and"):
+        policy.act(np.zeros(15))
+
+
 def test_a_learner_acts_as_it_did_in_training() -> None:
     algorithm = ALGORITHMS["ddpg"](hidden_sizes=(8,))
     built = algorithm.build(3, TEN_UES)
@@ -206,7 +228,7 @@ def test_an_environment_without_the_clock_is_refused() -> None:
 def test_another_number_of_ues_is_seen_behind_an_observation_of_the_same_size() -> None:
     fewer = dataclasses.replace(SCENARIO, ue_positions=SCENARIO.ue_positions[1:])
     policy = untrained("td3_robust", scenario=fewer)
-    with pytest.raises(InputError, match=r"observation = \(2, 15\): .* 9 UEs and clock=True"):
+    with pytest.raises(InputError, match=r"observation = \(2, 15\): .* 9 UEs, .* clock=True"):
         make_env(SCENARIO, batch_size=2).rollout(3, policy)
 
 

@@ -19,20 +19,22 @@ Policies = dict[str, list[TensorDictModuleBase]]
 """By scheme."""
 
 
-def require_nodes(policy: Policy, scenario: Scenario) -> None:
-    """Accept a scenario in which a policy observes as many nodes as where it was trained.
+def require_fit(policy: Policy, scenario: Scenario) -> None:
+    """Accept a scenario in which a policy observes and steers as much as where it was trained.
 
     Raises:
-        InputError: it has another number of UEs or eavesdroppers.
+        InputError: it has another number of UEs, helpers or eavesdroppers, or another control.
     """
-    trained_on = policy.environment["scenario"]
+    trained_on: Scenario = policy.environment["scenario"]
     for name, own, other in (
-        ("UEs", trained_on.num_ues, scenario.num_ues),
-        ("eavesdroppers", trained_on.num_eavesdroppers, scenario.num_eavesdroppers),
+        ("number of UEs", trained_on.num_ues, scenario.num_ues),
+        ("number of helpers", trained_on.num_helpers, scenario.num_helpers),
+        ("number of eavesdroppers", trained_on.num_eavesdroppers, scenario.num_eavesdroppers),
+        ("power_control", trained_on.power_control, scenario.power_control),
     ):
         if own != other:
             accepted = f"{own}, for which the checkpoint was trained"
-            raise InputError(rejection(f"number of {name}", other, accepted))
+            raise InputError(rejection(name, other, accepted))
 
 
 def learned_policies(
@@ -66,7 +68,7 @@ def learned_policies(
                 by_scheme.setdefault(schemes[learner.scheme], []).append(index)
         for scheme, indices in by_scheme.items():
             policy = configuration.policy(weights, indices)
-            require_nodes(policy, scenario)
+            require_fit(policy, scenario)
             policies.setdefault(scheme, []).append(policy)
     if not policies:
         accepted = f"what learners were trained for, {', '.join(map(str, sorted(horizons)))}"

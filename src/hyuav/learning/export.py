@@ -32,7 +32,7 @@ def export(
     The network itself stays as it is and where it is; what is written computes in float32.
 
     Args:
-        network: maps (..., K, observed) to (..., K, 2 H).
+        network: maps (..., K, observed) to (..., K, actions).
         path: of the file: ``.onnx``, ``.pt2`` (torch.export) or ``.pt`` (TorchScript).
         example: of its input, float32; in the file, K may be any number.
         environment: kept beside it in JSON.

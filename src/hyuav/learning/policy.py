@@ -72,13 +72,14 @@ class Policy(TensorDictModuleBase):
     """A way to fly by what is observed, which knows the environment that it was trained in.
 
     It is a module of PyTorch that takes observations as a tensor or a NumPy array (..., observed),
-    and gives actions (..., 2 H) of the same kind, in [-1, 1]; of a TensorDict it reads
+    and gives actions (..., actions) of the same kind, in [-1, 1], as
+    :class:`hyuav.envs.observation.ObservationLayout` has them; of a TensorDict it reads
     ``observation`` and writes ``action``. An observation that does not fit is refused in one line.
 
     Args:
-        network: maps observations (K, observed) to actions (K, 2 H), as a module of plain tensors,
-            or one of TensorDicts that reads ``observation`` and writes ``action``; of several
-            learners (N, K, observed) to (N, K, 2 H).
+        network: maps observations (K, observed) to actions (K, actions), as a module of plain
+            tensors, or one of TensorDicts that reads ``observation`` and writes ``action``; of
+            several learners (N, K, observed) to (N, K, actions).
         scenario: that it was trained on, or the name of a preset.
         scheme: who chose the mode there: "hybrid", "relay" or "jamming".
         clock: whether ``observation`` carried the slots flown; see :func:`hyuav.make_env`.
@@ -123,7 +124,7 @@ class Policy(TensorDictModuleBase):
         self.network = _as_network(network)
 
     def forward(self, observation: Observed) -> Observed:
-        """Act on observations (..., observed): actions (..., 2 H) of the same kind and device.
+        """Act on observations (..., observed): actions (..., actions) of the same kind and device.
 
         Args:
             observation: a tensor or an array of finite floating-point numbers, of any precision;
@@ -145,7 +146,7 @@ class Policy(TensorDictModuleBase):
 
     @torch.no_grad()
     def act(self, observation: Observed) -> Observed:
-        """The same without gradients: actions (..., 2 H) for observations (..., observed)."""
+        """The same without gradients: actions (..., actions) for observations (..., observed)."""
         return self.forward(observation)
 
     def predict(
@@ -164,7 +165,7 @@ class Policy(TensorDictModuleBase):
             deterministic: not used: it flies without noise in any case.
 
         Returns:
-            the actions (..., 2 H), and ``state``.
+            the actions (..., actions), and ``state``.
         """
         return self.act(observation), state
 
@@ -185,7 +186,7 @@ class Policy(TensorDictModuleBase):
 
         ``.onnx`` for ONNX Runtime and others, ``.pt2`` for ``torch.export.load``, ``.pt`` for
         ``torch.jit.load``. Its input is ``observation`` (batch, observed) float32, its output
-        ``action`` (batch, 2 H); of several learners (N, batch, ...). Beside it stands
+        ``action`` (batch, actions); of several learners (N, batch, ...). Beside it stands
         :attr:`environment` in JSON, under the name ``environment``.
 
         Args:
@@ -209,7 +210,8 @@ class Policy(TensorDictModuleBase):
         shape = ", ".join([*map(str, self._rows), "...", str(self._layout.size)])
         return (
             f"finite floating-point numbers of shape ({shape}), as an environment gives with "
-            f"{scenario.num_ues} UEs and clock={clock} (policy.make_env() makes one)"
+            f"{scenario.num_ues} UEs, {scenario.num_eavesdroppers} eavesdropper(s), "
+            f"{scenario.num_helpers} helper(s) and clock={clock} (policy.make_env() makes one)"
         )
 
     def _require_environment(self, state: TensorDictBase) -> None:
@@ -257,7 +259,7 @@ class ActorNetwork(nn.Module):
         self.actor, self.learner_axis = actor, learner_axis
 
     def forward(self, observation: Tensor) -> Tensor:
-        """Map observations (..., observed) to actions (..., 2 H)."""
+        """Map observations (..., observed) to actions (..., actions)."""
         observed = observation.unsqueeze(0) if self.learner_axis else observation
         entries = TensorDict({"observation": observed}, batch_size=observed.shape[:-1])
         action: Tensor = self.actor(entries)["action"]

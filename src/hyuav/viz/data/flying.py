@@ -11,7 +11,7 @@ from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evalu
 from hyuav.experiments.policies import (
     Policies,
     learned_policies,
-    require_nodes,
+    require_fit,
     straight_policies,
 )
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
@@ -146,7 +146,7 @@ def _policy(scenario: Scenario, checkpoint: Checkpoint) -> Policy:
     _require_size(scenario)
     configuration, weights = _saved(checkpoint.run, checkpoint.stamp)
     policy = configuration.policy(weights, [checkpoint.index])
-    require_nodes(policy, scenario)
+    require_fit(policy, scenario)
     return policy
 
 
