@@ -73,7 +73,7 @@ assert len(list(training.episodes())) == 3
 
 SETTINGS = """
 import logging, warnings
-import gymnasium, matplotlib.pyplot, pandas, scipy.sparse, scipy.special  # with filters of their own
+import gymnasium, matplotlib.pyplot, pandas, scipy.sparse, scipy.special  # have filters
 import torch, tensordict, torchrl.envs
 
 def settings():
