@@ -73,6 +73,7 @@ assert len(list(training.episodes())) == 3
 
 SETTINGS = """
 import logging, warnings
+import gymnasium, matplotlib.pyplot, pandas, scipy.sparse, scipy.special  # have filters
 import torch, tensordict, torchrl.envs
 
 def settings():
@@ -82,8 +83,6 @@ def settings():
     return {name: known[name] for name in ("root", "torchrl", "tensordict")}
 
 before, filters = settings(), list(warnings.filters)
-logging.getLogger("torchrl").setLevel(logging.DEBUG)
-logging.getLogger("torchrl").setLevel(before["torchrl"][0])
 """
 
 

@@ -1,19 +1,15 @@
 """What learning needs of what TorchRL keeps to itself, its private attributes, all in one place."""
 
 import math
-import warnings
 from typing import Any
 
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
+from torchrl.collectors import Collector
 from torchrl.data import ReplayBuffer
 from torchrl.objectives import SACLoss
 from torchrl.objectives.sac import compute_rsample_log_prob
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore", DeprecationWarning)  # in which it warns of itself
-    from torchrl.collectors import Collector as Collector
 
 
 def next_observation(collector: Collector) -> TensorDictBase:

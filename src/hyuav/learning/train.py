@@ -9,6 +9,7 @@ import torch
 from pydantic.dataclasses import dataclass
 from tensordict import TensorDictBase
 from torch import Tensor
+from torchrl.collectors import Collector
 
 from hyuav._support.errors import InputError
 from hyuav._support.parameters import Count, CountOrZero, Parameters, parameter
@@ -36,7 +37,7 @@ from hyuav.learning.compile import CompiledSlots, FlownEpisode, all_finite
 from hyuav.learning.exploration import as_planned
 from hyuav.learning.policy import NoiseFreeReturn, fly_noise_free
 from hyuav.learning.replay import latest, make_replay
-from hyuav.learning.torchrl_internals import Collector, cursor_of, next_observation, set_filled
+from hyuav.learning.torchrl_internals import cursor_of, next_observation, set_filled
 from hyuav.learning.weights import (
     begin_moments,
     copy_weights,
