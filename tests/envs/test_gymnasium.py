@@ -177,12 +177,14 @@ def test_writing_to_what_was_returned_does_not_move_the_helper(make: Build) -> N
 def test_a_copy_flies_on_with_the_same_random_numbers(
     build: Build, duplicate: Callable[[Any], Any]
 ) -> None:
-    env = build()
+    env = build(diagnostics=True, render_mode="rgb_array")
     env.reset(seed=0)
     action = np.zeros(env.action_space.shape, np.float32)
     env.step(action)
     twin = duplicate(env)
     np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
+    np.testing.assert_array_equal(env.render(), twin.render())
+    assert twin.spec.max_episode_steps == SCENARIO.num_slots
 
 
 def test_a_spec_makes_the_same_environment_again(make: Build, make_vec: Build) -> None:
@@ -200,6 +202,9 @@ BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"scenario": 3}, "scenario = 3"),
     ({"scheme": "relays"}, "did you mean 'relay'"),
     ({"device": "gpu"}, "device = 'gpu'"),
+    ({"clok": True}, "option = 'clok': expected one of .*did you mean 'clock'"),
+    ({"batch_size": 3}, "option = 'batch_size'"),
+    ({"geofence": 1}, "geofence = 1"),
 ]
 
 
@@ -254,6 +259,40 @@ def test_nothing_can_be_flown_before_a_reset(build: Build) -> None:
     env = build().unwrapped
     with pytest.raises(ResetNeeded):
         env.step(np.zeros(env.action_space.shape, np.float32))
+
+
+def test_nothing_can_be_flown_after_the_end_until_the_next_reset(make: Build) -> None:
+    env = make(SHORT)
+    env.reset(seed=0)
+    for action in random_actions(SHORT.num_slots):
+        env.step(action)
+    with pytest.raises(ResetNeeded, match=r"^the episode has ended: call reset\(\) before step"):
+        env.step(action)
+    env.reset()
+    assert not env.step(action)[3]
+
+
+def test_the_diagnostics_of_each_slot_are_told_where_asked_for(make: Build) -> None:
+    env = make(SHORT, diagnostics=True, fading=True)
+    native = make_env(SHORT, diagnostics=True, fading=True, seed=3)
+    actions = random_actions(SHORT.num_slots)
+    info = env.reset(seed=3)[1]
+    assert not info["diagnostics"]["ue_energy"].any()
+    for action, slot in zip(actions, torchrl_flight(native, actions), strict=True):
+        info["diagnostics"]["edge_load"][:] = -1.0  # of no effect on what follows
+        info = env.step(action)[4]
+        assert info["diagnostics"].keys() == slot["diagnostics"].keys()
+        for name, entry in slot["diagnostics"].items():
+            np.testing.assert_array_equal(info["diagnostics"][name], entry)
+        np.testing.assert_array_equal(info["fading"], slot["fading"])
+    assert "diagnostics" not in make(SHORT).reset(seed=3)[1]
+
+
+def test_an_environment_can_be_closed_twice(build: Build) -> None:
+    env = build()
+    env.reset(seed=0)
+    env.close()
+    env.close()
 
 
 def test_an_action_beyond_the_speed_limit_is_clipped(make: Build) -> None:

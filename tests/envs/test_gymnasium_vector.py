@@ -4,10 +4,10 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from hyuav import InputError, Scenario, make_env
 from reference import place, random_actions, torchrl_flight
@@ -24,8 +24,22 @@ def test_a_batch_of_no_helpers_is_refused(make_vec: Build, num_envs: Any) -> Non
         make_vec(num_envs)
 
 
+@pytest.mark.parametrize("num_envs", [np.int64(2), np.uint8(2)])
+def test_any_whole_number_of_helpers_is_accepted(make_vec: Build, num_envs: Any) -> None:
+    env = make_vec(num_envs)
+    assert (type(env.num_envs), env.reset(seed=0)[0].shape) == (int, (2, 15))
+
+
+@pytest.mark.parametrize("mode", ["same", 3, None])
+def test_an_unknown_autoreset_mode_is_refused_in_one_line(make_vec: Build, mode: Any) -> None:
+    with pytest.raises(InputError, match=r"autoreset_mode = .*NextStep, SameStep, Disabled"):
+        make_vec(autoreset_mode=mode)
+
+
 BAD_VECTOR_RESETS: list[tuple[dict[str, Any], str]] = [
-    ({"seed": [1, 2, 3]}, "seed ="),
+    ({"seed": [1, 2]}, r"seed = \[1, 2\]: expected one number, or one for each of 3 rows"),
+    ({"seed": [1, 2, -3]}, "seed = -3"),
+    ({"seed": [1, 2, "a"]}, "seed = 'a'"),
     ({"options": {"position": [(0.0, 0.0)] * 2}}, "position ="),
     ({"options": {"reset_mask": np.array([True])}}, "reset_mask ="),
     ({"options": {"reset_mask": np.array([1, 0, 0])}}, "reset_mask ="),
@@ -51,8 +65,6 @@ def test_a_batch_flies_as_the_torchrl_environment_of_that_batch_size(make_vec: B
     expected = torchrl_flight(make_env(SCENARIO, "hybrid", 3, seed=7, clock=True), actions)
     for action, slot in zip(actions, expected, strict=True):
         observation, reward, terminated, truncated, info = env.step(action)
-        if truncated.all():
-            observation, info = info["final_obs"], info["final_info"]
         np.testing.assert_array_equal(observation, slot["observation"])
         np.testing.assert_array_equal(reward, slot["reward"].squeeze(-1))
         np.testing.assert_array_equal(truncated, slot["truncated"].squeeze(-1))
@@ -61,6 +73,37 @@ def test_a_batch_flies_as_the_torchrl_environment_of_that_batch_size(make_vec: B
         np.testing.assert_array_equal(info["mode"], slot["mode"].squeeze(-1))
         np.testing.assert_array_equal(info["off_map"], slot["off_map"].squeeze(-1))
     assert truncated.all()
+
+
+def assert_alike(own: dict[str, Any], other: dict[str, Any]) -> None:
+    """Two infos of vector environments hold the same entries and masks."""
+    assert own.keys() == other.keys()
+    for name, entry in own.items():
+        if isinstance(entry, dict):
+            assert_alike(entry, other[name])
+        else:
+            np.testing.assert_allclose(entry, np.stack(other[name]), rtol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_rows_with_seeds_of_their_own_fly_as_gymnasium_s_vector_environment_does(
+    make: Build, make_vec: Build, mode: AutoresetMode
+) -> None:
+    chosen = {"diagnostics": True, "fading": True, "clock": True}
+    env = make_vec(3, SHORT, autoreset_mode=mode, **chosen)
+    several = SyncVectorEnv([lambda: make(SHORT, **chosen)] * 3, autoreset_mode=mode)
+    assert env.metadata["autoreset_mode"] is mode
+    (first, info), (other, other_info) = (each.reset(seed=[5, 9, 5]) for each in (env, several))
+    np.testing.assert_array_equal(first, other)
+    assert_alike(info, other_info)
+    for action in random_actions(3 * SHORT.num_slots, 3):
+        own, theirs = env.step(action), several.step(action)
+        for mine, their in zip(own[:4], theirs[:4], strict=True):
+            np.testing.assert_array_equal(mine, their)
+        assert_alike(own[4], theirs[4])
+        if mode is AutoresetMode.DISABLED and own[3].all():
+            for each in (env, several):  # Gymnasium's takes the mask out of the options
+                each.reset(options={"reset_mask": np.ones(3, bool)})
 
 
 def test_a_row_s_spaces_are_those_of_one_helper(make: Build, make_vec: Build) -> None:
@@ -73,8 +116,8 @@ def test_a_row_s_spaces_are_those_of_one_helper(make: Build, make_vec: Build) ->
 
 
 def test_a_row_earns_what_one_helper_earns_on_average(make: Build, make_vec: Build) -> None:
-    hovering = {"position": (80.0, 80.0)}
-    rows, env = make_vec(2000, scheme="jamming"), make(scheme="jamming")
+    hovering, long = {"position": (80.0, 80.0)}, dataclasses.replace(SCENARIO, num_slots=500)
+    rows, env = make_vec(2000, scheme="jamming"), make(long, scheme="jamming")
     rows.reset(seed=0, options=hovering)
     batch = rows.step(np.zeros((2000, 2), np.float32))[1]
     env.reset(seed=1, options=hovering)
@@ -85,8 +128,7 @@ def test_a_row_earns_what_one_helper_earns_on_average(make: Build, make_vec: Bui
 
 
 def test_a_row_that_has_flown_its_slots_starts_anew_in_the_same_step(make_vec: Build) -> None:
-    env = make_vec(2, SHORT)
-    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    env = make_vec(2, SHORT, autoreset_mode="SameStep")
     env.reset(seed=0)
     for slot in range(2 * SHORT.num_slots):
         observation, _, _, truncated, info = env.step(np.full((2, 2), 0.5, np.float32))
@@ -102,8 +144,9 @@ def test_a_row_that_has_flown_its_slots_starts_anew_in_the_same_step(make_vec: B
             np.testing.assert_allclose(info["position"], -60.0)
 
 
-def test_rows_reset_by_a_mask_start_anew_and_the_others_fly_on(make_vec: Build) -> None:
-    env = make_vec(3, SHORT, clock=True)
+def flown_apart(make_vec: Build, mode: AutoresetMode) -> Any:
+    """Three rows, of which the second is one slot behind; the others end with the next slot."""
+    env = make_vec(3, SHORT, clock=True, autoreset_mode=mode)
     action = np.full((3, 2), 0.5, np.float32)
     env.reset(seed=0)
     before = env.step(action)[0]
@@ -116,6 +159,11 @@ def test_rows_reset_by_a_mask_start_anew_and_the_others_fly_on(make_vec: Build) 
     np.testing.assert_array_equal(after[mask][:, -1], -1.0)
     np.testing.assert_array_equal(info["_position"], mask)
     env.step(action)
+    return env, action, mask
+
+
+def test_rows_that_end_apart_start_anew_in_the_step_that_ends_them(make_vec: Build) -> None:
+    env, action, mask = flown_apart(make_vec, AutoresetMode.SAME_STEP)
     observation, _, _, truncated, info = env.step(action)
     np.testing.assert_array_equal(truncated, ~mask)
     np.testing.assert_array_equal(info["_final_obs"], ~mask)
@@ -124,17 +172,56 @@ def test_rows_reset_by_a_mask_start_anew_and_the_others_fly_on(make_vec: Build) 
     np.testing.assert_array_equal(env.step(action)[3], mask)
 
 
-def test_gymnasium_s_own_wrappers_understand_the_batch(make_vec: Build) -> None:
-    wrappers = gymnasium.wrappers.vector
-    env = wrappers.DictInfoToList(wrappers.RecordEpisodeStatistics(make_vec(2, SHORT)))
-    env.reset(seed=0)
-    earned = np.zeros(2)
-    for action in random_actions(SHORT.num_slots, 2):
-        _, reward, _, _, infos = env.step(action)
-        earned += reward
-    assert [info["episode"]["l"] for info in infos] == [SHORT.num_slots] * 2
-    np.testing.assert_allclose([info["episode"]["r"] for info in infos], earned)
-    assert tuple(infos[0]["position"]) == SCENARIO.helper_starts[0]
+def test_rows_that_end_apart_start_anew_in_the_next_step(make_vec: Build) -> None:
+    env, action, mask = flown_apart(make_vec, AutoresetMode.NEXT_STEP)
+    _, _, _, truncated, info = env.step(action)
+    np.testing.assert_array_equal(truncated, ~mask)
+    np.testing.assert_allclose(info["position"], [[-30, -30], [20, 25], [-30, -30]])
+    _, reward, _, truncated, info = env.step(action)
+    np.testing.assert_array_equal(truncated, mask)
+    np.testing.assert_allclose(info["position"], [[-60, -60], [30, 35], [-60, -60]])
+    np.testing.assert_array_equal(reward[~mask], 0.0)
+    np.testing.assert_array_equal(info["secrecy_sum_rate"][~mask], 0.0)
+    _, _, _, truncated, info = env.step(action)
+    assert not truncated.any()
+    np.testing.assert_allclose(info["position"], [[-50, -50], [-60, -60], [-50, -50]])
+
+
+def test_without_autoreset_a_row_that_has_ended_waits_for_its_reset(make_vec: Build) -> None:
+    env, action, mask = flown_apart(make_vec, AutoresetMode.DISABLED)
+    np.testing.assert_array_equal(env.step(action)[3], ~mask)
+    with pytest.raises(ResetNeeded, match=r"^rows \[0, 2\] have ended: .*step\(\)$"):
+        env.step(action)
+    env.reset(options={"reset_mask": ~mask})
+    info = env.step(action)[4]
+    np.testing.assert_allclose(info["position"], [[-50, -50], [30, 35], [-50, -50]])
+
+
+def test_a_row_s_seed_alone_decides_its_flight(make_vec: Build) -> None:
+    env, hovering = make_vec(2, SHORT, autoreset_mode="Disabled"), {"position": (80.0, 80.0)}
+
+    def rewards(**reset: Any) -> Any:
+        options = hovering | reset.pop("options", {})
+        env.reset(**reset, options=options)
+        return np.stack([env.step(np.zeros((2, 2)))[1] for _ in range(SHORT.num_slots)], axis=-1)
+
+    first = rewards(seed=[1, 2])
+    np.testing.assert_array_equal(rewards(seed=np.array([2, 1])), first[::-1])
+    again = rewards(seed=[None, 2])
+    np.testing.assert_array_equal(again[1], first[1])
+    assert (again[0] != first[0]).all()
+    env.reset()
+    again = rewards(seed=[1, 2], options={"reset_mask": np.array([True, False])})
+    np.testing.assert_array_equal(again[0], first[0])
+    assert (again[1] != first[1]).all()
+    env.reset(seed=[1, 2])
+    assert (rewards(seed=[None, None]) != first).all()
+
+
+def test_each_row_may_fly_in_a_layout_of_its_own(make_vec: Build) -> None:
+    moved = dataclasses.replace(SCENARIO, helper_starts=((0.0, 0.0),))
+    positions = make_vec(2, [SCENARIO, moved]).reset(seed=0)[1]["position"]
+    np.testing.assert_array_equal(positions, [(-60.0, -60.0), (0.0, 0.0)])
 
 
 def test_each_row_may_fly_its_own_scheme(make_vec: Build) -> None:

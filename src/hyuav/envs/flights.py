@@ -1,11 +1,18 @@
 """Flights told in NumPy's terms: what Gymnasium's two kinds of environment share."""
 
+import copy
+import dataclasses
 import math
+import sys
 from collections.abc import Mapping, Sequence
+from types import FrameType
 from typing import Any
 
+import gymnasium
 import numpy as np
 import torch
+from gymnasium.envs import registration
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box, Space
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +20,8 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.envs import TransformedEnv
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav._support.parameters import Count, checked
+from hyuav.envs.arguments import as_scenario
 from hyuav.envs.recorder import FlightRecorder
 from hyuav.physics.scenario import Scenario
 
@@ -20,6 +29,9 @@ Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
 RENDERING: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4}
+
+WHERE_ASKED_FOR = ("fading", "diagnostics")
+"""Entries of the environment that ``info`` holds where the environment has them."""
 
 
 class Flights:
@@ -60,7 +72,9 @@ class Flights:
         observed = Box(np.full(layout.size, -1.0, np.float32), high.numpy(), dtype=np.float32)
         return observed, Box(-1.0, 1.0, (layout.action_size,), np.float32)
 
-    def reset(self, seed: int | None, position: ArrayLike | None, mask: Flags | None) -> None:
+    def reset(
+        self, seed: int | list[int] | None, position: ArrayLike | None, mask: Flags | None
+    ) -> None:
         """Start anew at ``position`` (2,) or (*B, 2) m, only in the rows of ``mask`` (*B,)."""
         if seed is not None:
             self.env.set_seed(seed, static_seed=True)
@@ -91,16 +105,19 @@ class Flights:
 
     def observation(self) -> Floats:
         """The normalized observation: (*B, observed)."""
-        return self.state["observation"].numpy(force=True)
+        return self.state["observation"].clone().numpy(force=True)  # wrappers write to it
 
-    def info(self, secrecy_sum_rate: Floats) -> dict[str, NDArray[Any]]:
+    def info(self, secrecy_sum_rate: Floats) -> dict[str, Any]:
         """The entries of ``info``, arrays of leading shape B; ``secrecy_sum_rate`` is (*B,)."""
+        names = ("position", "mode", "off_map", *WHERE_ASKED_FOR)
+        # Copied because the caller may write to it, and the next slot starts from it.
+        told = self.state.select(*names, strict=False).clone()
         return {
-            # Copied because the caller may write to it, and the next slot starts from it.
-            "position": self._position().copy(),
-            "mode": _column(self.state["mode"]),
-            "off_map": _column(self.state["off_map"]),
+            "position": told["position"].squeeze(-2).numpy(force=True),
+            "mode": _column(told["mode"]),
+            "off_map": _column(told["off_map"]),
             "secrecy_sum_rate": secrecy_sum_rate,
+            **{name: _arrays(told[name]) for name in WHERE_ASKED_FOR if name in told},
         }
 
     def frame(self, row: int = 0) -> NDArray[np.uint8]:
@@ -108,9 +125,56 @@ class Flights:
         picture: NDArray[np.uint8] = self.env.base_env.render(row)
         return picture
 
-    def _position(self) -> Floats:
-        """Where the helper is: (*B, 2) m."""
-        return self.state["position"].squeeze(-2).numpy(force=True)
+
+class Limited:
+    """An environment whose spec tells T as its ``max_episode_steps``."""
+
+    _flights: Flights
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What Gymnasium makes the environment from; None where it has not made it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, given: EnvSpec | None) -> None:
+        """Keep a copy, whatever limit it tells."""
+        self._spec = copy.copy(given)
+        if self._spec is not None:
+            self._spec.max_episode_steps = self._flights.scenario.num_slots
+
+
+def limit_of_make(env: gymnasium.Env[Any, Any]) -> int | None:
+    """The ``max_episode_steps`` given to the ``gymnasium.make`` that creates ``env`` just now.
+
+    Gymnasium tells it to nobody but a wrapper around the environment, which can make episodes
+    shorter but not longer. None where there is none, or the environment is not created so.
+    """
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and frame.f_locals.get("self") is env:
+        frame = frame.f_back
+    if frame is None or frame.f_code is not registration.make.__code__:
+        return None
+    limit: int | None = frame.f_locals.get("max_episode_steps")
+    spec: EnvSpec | None = frame.f_locals.get("env_spec")
+    return spec.max_episode_steps if limit is None and spec is not None else limit
+
+
+def limited(
+    scenario: Scenario | str | Sequence[Scenario | str], max_episode_steps: int | None
+) -> Scenario | str | Sequence[Scenario | str]:
+    """The scenario, or that of each row, with another T; the same for None and -1.
+
+    Raises:
+        InputError: ``max_episode_steps`` is no whole number, or below 1.
+    """
+    if max_episode_steps is None or max_episode_steps == -1:
+        return scenario
+    num_slots = checked(Count, "max_episode_steps", max_episode_steps)
+    if isinstance(scenario, Scenario | str) or not isinstance(scenario, Sequence):
+        return dataclasses.replace(as_scenario(scenario), num_slots=num_slots)
+    return [dataclasses.replace(as_scenario(each), num_slots=num_slots) for each in scenario]
 
 
 def accepted_options(options: object, names: Sequence[str]) -> Mapping[str, Any]:
@@ -129,6 +193,15 @@ def accepted_options(options: object, names: Sequence[str]) -> Mapping[str, Any]
     return options
 
 
+def with_masks(entries: Mapping[str, Any], rows: Flags) -> dict[str, Any]:
+    """Add to each entry the rows that it holds for, as Gymnasium's vector infos have it."""
+    own = {
+        name: with_masks(entry, rows) if isinstance(entry, Mapping) else entry
+        for name, entry in entries.items()
+    }
+    return own | {f"_{name}": rows.copy() for name in own}
+
+
 def _as_tensor(
     name: str, value: ArrayLike, shapes: Sequence[tuple[int, ...]], device: torch.device
 ) -> torch.Tensor:
@@ -140,6 +213,13 @@ def _as_tensor(
     if array.shape not in shapes or not np.isfinite(array).all():
         raise InputError(rejection(name, value, accepted))
     return torch.tensor(array, device=device)
+
+
+def _arrays(entry: torch.Tensor | TensorDictBase) -> Any:
+    """An entry's array, or those of the entries in it."""
+    if isinstance(entry, torch.Tensor):
+        return entry.numpy(force=True)
+    return {name: _arrays(own) for name, own in entry.items()}
 
 
 def _column(values: torch.Tensor) -> NDArray[Any]:
