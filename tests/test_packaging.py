@@ -155,4 +155,5 @@ def test_this_python_is_one_of_those_stated() -> None:
 
 
 def test_the_extras_are_there() -> None:
-    assert {"bench", "cluster", "dashboard", "docs", "dev"} == set(PROJECT["optional-dependencies"])
+    extras = {"bench", "cluster", "dashboard", "docs", "dev", "sb3"}
+    assert extras == set(PROJECT["optional-dependencies"])
