@@ -155,5 +155,5 @@ def test_this_python_is_one_of_those_stated() -> None:
 
 
 def test_the_extras_are_there() -> None:
-    extras = {"bench", "cluster", "dashboard", "docs", "dev", "sb3"}
+    extras = {"bench", "cluster", "dashboard", "docs", "dev", "sb3", "video"}
     assert extras == set(PROJECT["optional-dependencies"])
