@@ -145,11 +145,12 @@ class Limited:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """Of Gymnasium, which sets it."""
+        """What Gymnasium makes the environment from; None where it has not made it."""
         return self._spec
 
     @spec.setter
     def spec(self, given: EnvSpec | None) -> None:
+        """Keep a copy, whatever limit it tells."""
         self._spec = copy.copy(given)
         if self._spec is not None:
             self._spec.max_episode_steps = self._flights.scenario.num_slots
