@@ -1,6 +1,7 @@
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,7 +10,7 @@ import torch
 from scipy import stats
 
 from batches import TEN_UES
-from hyuav import InputError, Scenario
+from hyuav import InputError, InputTypeError, Scenario
 from hyuav.experiments.evaluation import (
     EvaluationParameters,
     Policy,
@@ -120,6 +121,30 @@ def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> Non
     torch.testing.assert_close(
         secrecy_sum_rate(flown), flown["diagnostics", "jamming_sum_rate"].squeeze(-1)
     )
+
+
+def test_a_preset_and_one_policy_are_enough() -> None:
+    one = evaluate("two_clusters", "", {"re_lt": Policy(re_lt("two_clusters"))}, FEW)
+    named = Scenario.preset("two_clusters")
+    several = evaluate(named, "", {"re_lt": [Policy(re_lt(named))]}, FEW)
+    assert one.summary == several.summary
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "line"),
+    [
+        (0, 3, "scenario = 3: expected a Scenario or a preset's name"),
+        (2, [], r"policies = \[\]: expected names with values"),
+        (2, {"re_lt": re_lt("two_clusters")}, r"policies\['re_lt'\] = .*: expected at least one"),
+        (2, {"re_lt": ["x"]}, r"policies\['re_lt'\] = \['x'\]: expected at least one Policy"),
+        (3, {"episodes": 2}, r"parameters = {'episodes': 2}: expected EvaluationParameters\("),
+    ],
+)
+def test_a_wrong_type_is_told_in_one_line(place: int, value: Any, line: str) -> None:
+    arguments: list[Any] = [SCENARIO, "", {"re_lt": Policy(re_lt(SCENARIO))}, FEW]
+    arguments[place] = value
+    with pytest.raises(InputTypeError, match=line):
+        evaluate(*arguments)
 
 
 def test_flights_are_kept_a_row_per_slot(policies: dict[str, list[Policy]], tmp_path: Path) -> None:

@@ -8,20 +8,12 @@ import torch
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav._support.parameters import plain
 from hyuav.physics.offloading import MODE_RULES
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, as_scenario
 
 LAYOUT = ("ue_positions", "legitimate_position", "helper_starts", "eavesdropper_positions")
 """The fields of a scenario in which the rows of a batch may differ."""
-
-
-def as_scenario(scenario: Scenario | str) -> Scenario:
-    """A scenario as it is, or the preset of that name."""
-    if isinstance(scenario, str):
-        return Scenario.preset(scenario)
-    if not isinstance(scenario, Scenario):
-        raise InputTypeError(rejection("scenario", scenario, "a Scenario or a preset's name"))
-    return scenario
 
 
 def as_scenarios(
@@ -31,9 +23,10 @@ def as_scenarios(
 
     Those of several rows differ in their nodes' positions only, and in no number of nodes.
     """
-    if isinstance(scenario, Scenario | str) or not isinstance(scenario, Sequence):
-        return (as_scenario(scenario),)
-    scenarios = tuple(as_scenario(each) for each in scenario)
+    given = plain(scenario)
+    if not isinstance(given, tuple):
+        return (as_scenario(given),)
+    scenarios = tuple(as_scenario(each) for each in given)
     rows = batch_size[0] if batch_size else 0
     if len(scenarios) != rows:
         accepted = f"one scenario, or one for each of {rows} rows"
@@ -50,9 +43,10 @@ def as_scenarios(
 
 def as_batch_size(batch_size: int | Sequence[int]) -> torch.Size:
     """A whole number or a sequence of them, each at least 1."""
-    sizes = (batch_size,) if isinstance(batch_size, int) else batch_size
+    given = plain(batch_size)
+    sizes = given if isinstance(given, tuple) else (given,)
     accepted = "whole numbers >= 1"
-    if not isinstance(sizes, Sequence) or not all(type(size) is int for size in sizes):
+    if not all(type(size) is int for size in sizes):
         raise InputTypeError(rejection("batch_size", batch_size, accepted))
     if any(size < 1 for size in sizes):
         raise InputError(rejection("batch_size", batch_size, accepted))
@@ -61,17 +55,18 @@ def as_batch_size(batch_size: int | Sequence[int]) -> torch.Size:
 
 def as_schemes(scheme: str | Sequence[str], batch_size: torch.Size) -> tuple[str, ...]:
     """One scheme for all rows, or one for each row of the batch's first dimension."""
-    if isinstance(scheme, str):
-        require_choice("scheme", scheme, MODE_RULES)
-        return (scheme,)
-    if not isinstance(scheme, Sequence):
+    given = plain(scheme)
+    if isinstance(given, str):
+        require_choice("scheme", given, MODE_RULES)
+        return (given,)
+    if not isinstance(given, tuple):
         raise InputTypeError(rejection("scheme", scheme, f"one of {', '.join(MODE_RULES)}"))
-    for index, name in enumerate(scheme):
+    for index, name in enumerate(given):
         require_choice(f"scheme[{index}]", name, MODE_RULES)
-    if not batch_size or len(scheme) != batch_size[0]:
+    if not batch_size or len(given) != batch_size[0]:
         rows = batch_size[0] if batch_size else 0
         raise InputError(rejection("scheme", scheme, f"one name, or one for each of {rows} rows"))
-    return tuple(scheme)
+    return given
 
 
 def require_shape(name: str, values: Tensor, shape: Sequence[int]) -> None:

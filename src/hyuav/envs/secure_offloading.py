@@ -9,8 +9,8 @@ from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import checked
+from hyuav._support.errors import InputError, InputTypeError, rejection
+from hyuav._support.parameters import checked, plain
 from hyuav.envs.arguments import (
     as_batch_size,
     as_device,
@@ -89,7 +89,7 @@ class SecureOffloadingEnv(EnvBase):
         scheme: str | Sequence[str] = "hybrid",
         batch_size: int | Sequence[int] = (),
         device: torch.device | str | None = None,
-        seed: int | list[int] | tuple[int, ...] | None = None,
+        seed: int | Sequence[int] | None = None,
         diagnostics: bool = False,
         fading: bool = False,
     ) -> None:
@@ -109,10 +109,11 @@ class SecureOffloadingEnv(EnvBase):
             self._norm_limit = self._per_row(norm_limit).unsqueeze(-2)  # the helpers' axis
         self._make_specs()
         self.draws: Draws
-        if isinstance(seed, list | tuple):
-            self.draws = Draws(self.physics, self.batch_size, as_seeds(seed, self.batch_size))
+        seeds = plain(seed)
+        if isinstance(seeds, tuple):
+            self.draws = Draws(self.physics, self.batch_size, as_seeds(seeds, self.batch_size))
         else:
-            self.set_seed(as_seed(seed))
+            self.set_seed(as_seed(seeds))
 
     def _layout(self) -> Nodes:
         """Where the nodes are before the first slot, in each row where the rows differ."""
@@ -208,6 +209,8 @@ class SecureOffloadingEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         position, action = tensordict["position"], tensordict["action"]
         require_shape("action", action, position.shape)
+        if action.is_complex():
+            raise InputTypeError(rejection("action", action.dtype, "real numbers"))
         action = action.to(torch.float32)  # as specified, whatever is given
         velocity = self.physics.velocity(action, self._norm_limit)
         after, outcome, tasks = self._slot(position, velocity)

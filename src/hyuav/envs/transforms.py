@@ -77,7 +77,7 @@ def make_env(
     scheme: str | Sequence[str] = "hybrid",
     batch_size: int | Sequence[int] = (),
     device: torch.device | str | None = None,
-    seed: int | list[int] | tuple[int, ...] | None = None,
+    seed: int | Sequence[int] | None = None,
     diagnostics: bool = False,
     *,
     fading: bool = False,

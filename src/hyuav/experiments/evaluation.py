@@ -16,13 +16,21 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.files import write_durably
-from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNumber, parameter
+from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    Parameters,
+    PositiveNumber,
+    mapping,
+    parameter,
+    require_record,
+)
 from hyuav._support.randomness import derived_seed
 from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, as_scenario
 from hyuav.references.optimum import RESOLUTION
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -75,9 +83,9 @@ class Evaluation:
 
 
 def evaluate(
-    scenario: Scenario,
+    scenario: Scenario | str,
     name: str,
-    policies: Mapping[str, Sequence[Policy]],
+    policies: Mapping[str, Policy | Sequence[Policy]],
     parameters: EvaluationParameters,
     device: torch.device | str | None = None,
     *,
@@ -86,7 +94,7 @@ def evaluate(
     """Fly every scheme through the same draws of fading and tasks.
 
     Args:
-        scenario: node positions and parameters.
+        scenario: node positions and parameters, or the name of a preset.
         name: of the scenario, for the record.
         policies: by scheme, names of :data:`.schemes.SCHEMES`: one or more, as from several seeds.
             Fractions of the optimum are given where the optima are among them.
@@ -96,18 +104,15 @@ def evaluate(
 
     Raises:
         InputError: no scheme, an unknown one, or one without a policy.
+        InputTypeError: an argument of the wrong type.
     """
-    for scheme, several in policies.items():
-        require_choice("scheme", scheme, SCHEMES)
-        if not several:
-            raise InputError(rejection(f"policies[{scheme!r}]", several, "at least one policy"))
-    if not policies:
-        raise InputError(rejection("policies", policies, "at least one scheme"))
+    scenario, by_scheme = as_scenario(scenario), _by_scheme(policies)
+    require_record("parameters", parameters, EvaluationParameters)
     flown = {
         scheme: _together(
-            [fly(scenario, scheme, policy, parameters, device) for policy in policies[scheme]]
+            [fly(scenario, scheme, policy, parameters, device) for policy in by_scheme[scheme]]
         )
-        for scheme in track([scheme for scheme in SCHEMES if scheme in policies])
+        for scheme in track([scheme for scheme in SCHEMES if scheme in by_scheme])
     }
     returns = {
         scheme: flights.totals["secrecy_sum_rate"].numpy() for scheme, flights in flown.items()
@@ -125,6 +130,26 @@ def evaluate(
     }
     rows = [slot_table(scheme, flights.slots) for scheme, flights in flown.items()]
     return Evaluation(summary, pd.concat(rows, ignore_index=True))
+
+
+def _by_scheme(
+    policies: Mapping[str, Policy | Sequence[Policy]],
+) -> dict[str, tuple[Policy, ...]]:
+    several = {
+        scheme: (own,) if isinstance(own, Policy) else own
+        for scheme, own in mapping("policies", policies).items()
+    }
+    if not several:
+        raise InputError(rejection("policies", policies, "at least one scheme"))
+    for scheme, given in several.items():
+        require_choice("scheme", scheme, SCHEMES)
+        of_policies = isinstance(given, list | tuple)
+        if not of_policies or not all(isinstance(own, Policy) for own in given):
+            accepted = "at least one Policy(...)"
+            raise InputTypeError(rejection(f"policies[{scheme!r}]", given, accepted))
+        if not given:
+            raise InputError(rejection(f"policies[{scheme!r}]", given, "at least one policy"))
+    return several
 
 
 @dataclass(frozen=True)

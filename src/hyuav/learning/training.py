@@ -24,17 +24,19 @@ from hyuav._support.parameters import (
     Threads,
     checked,
     parameter,
+    require_record,
 )
 from hyuav._support.recording import COMPILATION_ERRORS, has_compiler
 from hyuav.envs.arguments import as_device
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import require_entries, require_like
 from hyuav.learning.compile import FlownEpisode
+from hyuav.learning.learners import as_learners
 from hyuav.learning.memory import require_memory
 from hyuav.learning.policy import NoiseFreeReturn
 from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learners
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, as_scenario
 
 COMPILE_SECONDS = 20.0
 """What compiling one program takes."""
@@ -101,8 +103,8 @@ class Training:
     whatever the process does besides, up to the rounding of differently arranged sums.
 
     Args:
-        scenario: node positions and parameters.
-        learners: one or more.
+        scenario: node positions and parameters, or the name of a preset.
+        learners: one or more; or their seeds, or how many, with seeds from 0 on.
         algorithm: which one, with its hyperparameters.
         parameters: how long and on what to learn.
         device: of all tensors.
@@ -114,21 +116,18 @@ class Training:
 
     def __init__(
         self,
-        scenario: Scenario,
-        learners: Sequence[Learner],
+        scenario: Scenario | str,
+        learners: int | Learner | Sequence[int | Learner],
         algorithm: AlgorithmParameters,
         parameters: TrainingParameters,
         device: torch.device | str | None = None,
     ) -> None:
-        of_learners = isinstance(learners, list | tuple) and all(
-            isinstance(learner, Learner) for learner in learners
-        )
-        if not of_learners or not learners:
-            raise InputTypeError(rejection("learners", learners, "a list of at least one Learner"))
         if not isinstance(algorithm, AlgorithmParameters):
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
+        require_record("parameters", parameters, TrainingParameters)
+        scenario = as_scenario(scenario)
         self.scenario, self.parameters = scenario, parameters
-        self.learners = tuple(learners)
+        self.learners = as_learners(learners)
         device = as_device(device)
         on_cpu = device.type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
@@ -144,7 +143,7 @@ class Training:
         self.cohorts = [
             Cohort(
                 dataclasses.replace(scenario, num_slots=self.horizons[members[0]]),
-                [learners[index] for index in members],
+                [self.learners[index] for index in members],
                 algorithm,
                 parameters.replay_size,
                 parameters.batch_size,

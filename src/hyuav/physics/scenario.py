@@ -5,7 +5,7 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
-from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.parameters import Fraction, Number, OneOf, Parameters, parameter
 
 LARGEST_LOAD = 1e30
@@ -175,3 +175,17 @@ class Scenario(Parameters):
         """
         require_choice("scenario", name, PRESETS)
         return cls(ue_positions=PRESETS[name])
+
+
+def as_scenario(scenario: Scenario | str) -> Scenario:
+    """A scenario as it is, or the preset of that name.
+
+    Raises:
+        InputError: there is none of that name.
+        InputTypeError: it is neither.
+    """
+    if isinstance(scenario, str):
+        return Scenario.preset(scenario)
+    if not isinstance(scenario, Scenario):
+        raise InputTypeError(rejection("scenario", scenario, "a Scenario or a preset's name"))
+    return scenario

@@ -10,7 +10,7 @@ from hyuav.physics import channel, energy, motion, offloading, rates
 from hyuav.physics.channel import LinkRow, Links
 from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import ModeRule
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, as_scenario
 from hyuav.physics.tasks import Tasks
 
 
@@ -101,7 +101,7 @@ class Physics:
     """The scenario's constants on a device.
 
     Args:
-        scenario: node positions and parameters.
+        scenario: node positions and parameters, or the name of a preset.
         device: of all tensors.
         dtype: float32 or float64.
         nodes: where the nodes are before the first slot, where that is not the scenario's layout
@@ -110,12 +110,12 @@ class Physics:
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: Scenario | str,
         device: torch.device | str | None = None,
         dtype: torch.dtype = torch.float32,
         nodes: Nodes | None = None,
     ) -> None:
-        self.scenario = scenario
+        self.scenario = scenario = as_scenario(scenario)
         self.device = torch.device(device) if device is not None else torch.device("cpu")
         self.dtype = dtype
         self.nodes = Nodes.of(scenario, self.device, dtype) if nodes is None else nodes

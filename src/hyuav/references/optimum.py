@@ -16,18 +16,20 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 import torch
 import torch.nn.functional as F  # noqa: N812
+from numpy.typing import ArrayLike
 from pydantic import Field
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection
-from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked
-from hyuav.envs.arguments import as_scenario, as_seed
+from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked, plain
+from hyuav.envs.arguments import as_seed
 from hyuav.physics.offloading import MODE_RULES, ModeRuleName
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, as_scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.grid import Grid, Reach, best_flight, grid_over_map, values_to_go
 from hyuav.references.rewards import estimate_return, reward_maps
@@ -74,8 +76,12 @@ class FlightPolicy(TensorDictModuleBase):
     last ones when the path is flown.
 
     Args:
-        path: (T + 1, H, 2) m, such as :attr:`Optimum.path`.
-        scenario: whose speed and slot duration the environment has.
+        path: (T + 1, H, 2) m, such as :attr:`Optimum.path`; a tensor, an array or lists.
+        scenario: whose speed and slot duration the environment has, or the name of a preset.
+
+    Raises:
+        InputError: a path of another shape.
+        InputTypeError: an argument of the wrong type.
 
     Example:
         >>> optimum = solve_optimum("two_clusters", ["hybrid"])["hybrid"]
@@ -86,8 +92,16 @@ class FlightPolicy(TensorDictModuleBase):
     in_keys = ("position", "step_count")
     out_keys = ("action",)
 
-    def __init__(self, path: Tensor, scenario: Scenario) -> None:
+    def __init__(self, path: Tensor | ArrayLike, scenario: Scenario | str) -> None:
         super().__init__()
+        scenario, given = as_scenario(scenario), path
+        accepted = f"positions in m of shape (T + 1, {scenario.num_helpers}, 2)"
+        try:
+            path = path if isinstance(path, Tensor) else torch.from_numpy(np.array(path, float))
+        except (TypeError, ValueError):
+            raise InputTypeError(rejection("path", given, accepted)) from None
+        if path.ndim != 3 or path.shape[1:] != (scenario.num_helpers, 2) or not len(path):
+            raise InputError(rejection("path", tuple(path.shape), accepted))
         self.register_buffer("path", path.to(torch.float64))
         self.step_length = scenario.max_speed * scenario.slot_duration
 
@@ -180,6 +194,7 @@ def solve_horizons(
     longest = max(scenarios)
     draws = checked(_Draws, "draws", draws)
     evaluation_draws = checked(_Draws, "evaluation_draws", evaluation_draws)
+    resolution = plain(resolution)
     require_resolution(resolution, scenario.map_side, longest)
     root = torch.Generator().manual_seed(as_seed(seed))
     map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root, device="cpu").tolist()
@@ -207,9 +222,10 @@ def solve_horizons(
 
 
 def _with_horizons(scenario: Scenario, horizons: Sequence[int]) -> dict[int, Scenario]:
-    if not isinstance(horizons, Sequence | range) or not horizons:
+    numbers = plain(horizons)
+    if not isinstance(numbers, tuple) or not numbers:
         raise InputError(rejection("horizons", horizons, "at least one whole number >= 1"))
-    return {n: dataclasses.replace(scenario, num_slots=n) for n in horizons}
+    return {n: dataclasses.replace(scenario, num_slots=n) for n in numbers}
 
 
 def require_resolution(resolution: float, map_side: float, num_slots: int) -> None:

@@ -8,7 +8,7 @@ from tensordict.nn import TensorDictModuleBase
 
 from hyuav._support.errors import InputError
 from hyuav.physics.energy import budget_speed
-from hyuav.physics.scenario import Point, Scenario
+from hyuav.physics.scenario import Point, Scenario, as_scenario
 
 
 def relay_destination(scenario: Scenario) -> Point:
@@ -75,11 +75,13 @@ class ConstantVelocity(TensorDictModuleBase):
         return tensordict
 
 
-def re_lt(scenario: Scenario) -> ConstantVelocity:
-    """Relay mode with a linear trajectory (Re-LT)."""
+def re_lt(scenario: Scenario | str) -> ConstantVelocity:
+    """Relay mode with a linear trajectory (Re-LT), in a scenario or a preset of that name."""
+    scenario = as_scenario(scenario)
     return ConstantVelocity(scenario, relay_destination(scenario), "relay")
 
 
-def ja_lt(scenario: Scenario) -> ConstantVelocity:
-    """Jamming mode with a linear trajectory (Ja-LT)."""
+def ja_lt(scenario: Scenario | str) -> ConstantVelocity:
+    """Jamming mode with a linear trajectory (Ja-LT), in a scenario or a preset of that name."""
+    scenario = as_scenario(scenario)
     return ConstantVelocity(scenario, jamming_destination(scenario), "jamming")
