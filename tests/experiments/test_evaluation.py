@@ -11,7 +11,7 @@ from scipy import stats
 from torch import nn
 
 from batches import TEN_UES
-from hyuav import InputError, Policy, Scenario
+from hyuav import InputError, InputTypeError, Policy, Scenario
 from hyuav.experiments.evaluation import (
     EvaluationParameters,
     confidence_interval,
@@ -125,6 +125,30 @@ def test_the_secrecy_sum_rate_is_that_of_the_mode_flown_without_penalty() -> Non
     torch.testing.assert_close(
         secrecy_sum_rate(flown), flown["diagnostics", "jamming_sum_rate"].squeeze(-1)
     )
+
+
+def test_a_preset_and_one_policy_are_enough() -> None:
+    one = evaluate("two_clusters", "", {"re_lt": re_lt("two_clusters")}, FEW)
+    named = Scenario.preset("two_clusters")
+    several = evaluate(named, "", {"re_lt": [re_lt(named)]}, FEW)
+    assert one.summary == several.summary
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "line"),
+    [
+        (0, 3, "scenario = 3: expected a Scenario, a preset's name or UE positions"),
+        (2, [], r"policies = \[\]: expected names with values"),
+        (2, {"re_lt": 3}, r"policies\['re_lt'\] = 3: expected at least one policy"),
+        (2, {"re_lt": ["x"]}, r"policies\['re_lt'\] = \['x'\]: expected at least one policy"),
+        (3, {"episodes": 2}, r"parameters = {'episodes': 2}: expected EvaluationParameters\("),
+    ],
+)
+def test_a_wrong_type_is_told_in_one_line(place: int, value: Any, line: str) -> None:
+    arguments: list[Any] = [SCENARIO, "", {"re_lt": re_lt(SCENARIO)}, FEW]
+    arguments[place] = value
+    with pytest.raises(InputTypeError, match=line):
+        evaluate(*arguments)
 
 
 def test_flights_are_kept_a_row_per_slot(policies: Policies, tmp_path: Path) -> None:

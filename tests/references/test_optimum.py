@@ -3,10 +3,11 @@ import itertools
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 
-from hyuav import InputError, Scenario, make_env
+from hyuav import InputError, InputTypeError, Scenario, make_env
 from hyuav.physics.energy import budget_speeds
 from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS
@@ -300,3 +301,21 @@ def test_halving_the_default_resolution_moves_no_value_by_two_parts_in_a_thousan
 def test_mode_rules_are_a_name_or_a_list_of_names(mode_rules: Any) -> None:
     with pytest.raises(InputError, match=r"^mode_rules[^\n]*expected[^\n]*hybrid"):
         solve_optimum(without_fading(), mode_rules, resolution=10.0)
+
+
+def test_numbers_and_paths_of_any_kind_are_taken() -> None:
+    few: dict[str, Any] = {
+        "draws": np.int64(2),
+        "evaluation_draws": torch.tensor(2),
+        "seed": np.uint8(3),
+    }
+    for resolution in (np.float32(20.0), torch.tensor(20), np.int64(20)):
+        found = solve_optimum("two_clusters", np.array(["relay"]), resolution=resolution, **few)
+        assert found["relay"].resolution == 20
+    path = found["relay"].path
+    for given in (path.numpy(), path.tolist()):
+        assert torch.equal(FlightPolicy(given, "two_clusters").path, path)
+    with pytest.raises(InputTypeError, match=r"path = 'x': expected positions in m of shape"):
+        FlightPolicy("x", "two_clusters")
+    with pytest.raises(InputError, match=r"path = \(20, 2\): expected .* shape \(T \+ 1, 1, 2\)"):
+        FlightPolicy(np.zeros((20, 2)), "two_clusters")

@@ -103,7 +103,7 @@ def checked(annotation: Any, name: str, value: Any) -> Any:
         InputTypeError: (also a ``TypeError``) a value of the wrong type.
     """
     try:
-        return _adapter(annotation).validate_python(_plain(value))
+        return _adapter(annotation).validate_python(plain(value))
     except ValidationError as error:
         raise _in_one_line(error, annotation, value, name) from None
 
@@ -168,6 +168,16 @@ def mapping(name: str, value: object) -> dict[str, Any]:
     return {str(key): entry for key, entry in value.items()}
 
 
+def require_record(name: str, value: object, kind: type) -> None:
+    """Accept a record of this kind.
+
+    Raises:
+        InputTypeError: it is something else.
+    """
+    if not isinstance(value, kind):
+        raise InputTypeError(rejection(name, value, f"{kind.__name__}(...)"))
+
+
 class _InOneLine(ABCMeta):
     """Creates records, and answers what they do not accept in one line."""
 
@@ -175,7 +185,7 @@ class _InOneLine(ABCMeta):
         if not is_pydantic_dataclass(cls):
             raise TypeError(f"{cls.__name__} is to be a dataclass of pydantic.dataclasses")
         try:
-            return super().__call__(*map(_plain, values), **_plain(named))
+            return super().__call__(*map(plain, values), **plain(named))
         except ValidationError as error:
             given = dict(zip(_hints(cls), values, strict=False)) | named
             raise _in_one_line(error, cls, given) from None
@@ -186,8 +196,8 @@ class Parameters(metaclass=_InOneLine):
     """A record that checks its fields on creation: a frozen dataclass of pydantic.
 
     Every field has an annotated type, such as :data:`Count`, and is declared by
-    :func:`parameter`; it may be such a record itself. Lists, arrays and tensors are taken for
-    tuples, NumPy's numbers for Python's.
+    :func:`parameter`; it may be such a record itself. Lists, ranges, arrays and tensors are taken
+    for tuples, NumPy's numbers for Python's.
 
     Raises:
         InputError: (a ``ValueError``) a value out of its range.
@@ -252,18 +262,22 @@ def _as_lists(value: Any) -> Any:
     return [_as_lists(item) for item in value] if isinstance(value, tuple) else value
 
 
-def _plain(value: Any, depth: int = DEEPEST) -> Any:
-    """Lists, arrays and tensors as tuples, NumPy's numbers as Python's, also in mappings."""
+def plain(value: Any, depth: int = DEEPEST) -> Any:
+    """What a person may give for numbers or texts, in Python's own types.
+
+    Lists, ranges, arrays and tensors become tuples, NumPy's numbers Python's, also in mappings.
+    What is none of these is left as it is.
+    """
     if type(value) in SCALARS:
         return value
     try:
         value = value.tolist() if hasattr(value, "tolist") else value
     except (TypeError, ValueError, RuntimeError):  # a tensor without content
         return value
-    if isinstance(value, list | tuple) and depth:
-        return tuple(_plain(item, depth - 1) for item in value)
+    if isinstance(value, list | tuple | range) and depth:
+        return tuple(plain(item, depth - 1) for item in value)
     if isinstance(value, Mapping) and depth:
-        return {name: _plain(entry, depth - 1) for name, entry in value.items()}
+        return {name: plain(entry, depth - 1) for name, entry in value.items()}
     return value
 
 
@@ -310,8 +324,8 @@ def _in_one_line(error: ValidationError, annotation: Any, value: Any, name: str 
         elif kind != "missing":  # or the tuple as a whole is too short
             elements = typing.get_args(expected)
             annotation = elements[0 if elements[-1] is ... else part]
-            if isinstance(_plain(value), tuple):  # else a single element stands for it
-                name, value = f"{name}[{part}]", _plain(value)[part]
+            if isinstance(plain(value), tuple):  # else a single element stands for it
+                name, value = f"{name}[{part}]", plain(value)[part]
     if isinstance(own := context.get("error"), InputError):  # which a record raised itself
         return type(own)(f"{name}.{own}") if name else own
     words = accepted(annotation)

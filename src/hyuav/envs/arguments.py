@@ -3,16 +3,17 @@
 import dataclasses
 import operator
 from collections.abc import Sequence
-from typing import Any, TypeGuard
+from typing import Any
 
 import torch
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection
+from hyuav._support.parameters import plain
 from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import MODE_RULES, fixed_modes
-from hyuav.physics.scenario import Point, Scenario
+from hyuav.physics.scenario import Scenario, as_scenario, is_layout
 
 LAYOUT = ("ue_positions", "legitimate_position", "helper_starts", "eavesdropper_positions")
 """The fields of a scenario in which the rows of a batch may differ."""
@@ -20,21 +21,6 @@ LAYOUT = ("ue_positions", "legitimate_position", "helper_starts", "eavesdropper_
 
 NODES = (*LAYOUT[:2], LAYOUT[3])
 """Those of nodes that do not fly."""
-
-ScenarioLike = Scenario | str | Sequence[Point]
-"""A scenario, a preset's name, or UE positions in m, all else being as in the paper."""
-
-
-def as_scenario(scenario: object) -> Scenario:
-    """A scenario as it is, the preset of that name, or the paper's with these UE positions."""
-    if isinstance(scenario, str):
-        return Scenario.preset(scenario)
-    if _is_layout(scenario):
-        return Scenario(ue_positions=scenario)
-    if not isinstance(scenario, Scenario):
-        accepted = "a Scenario, a preset's name or UE positions"
-        raise InputTypeError(rejection("scenario", scenario, accepted))
-    return scenario
 
 
 def as_scenarios(
@@ -46,10 +32,10 @@ def as_scenarios(
     a batch size, there is a row for each.
     """
     sizes = as_batch_size(batch_size)
-    several = isinstance(scenario, Sequence) and not isinstance(scenario, str)
-    if not several or _is_layout(scenario):
-        return (as_scenario(scenario),), sizes
-    scenarios = tuple(as_scenario(each) for each in scenario)
+    given = plain(scenario)
+    if not isinstance(given, tuple) or is_layout(given):
+        return (as_scenario(given),), sizes
+    scenarios = tuple(as_scenario(each) for each in given)
     sizes = sizes or torch.Size((len(scenarios),))
     if not scenarios or len(scenarios) != sizes[0]:
         accepted = f"one scenario, or one for each of {sizes[0] or 'several'} rows"
@@ -77,20 +63,12 @@ def require_layouts(generator: LayoutGenerator) -> None:
             raise InputError(rejection(f"scenario.draw(...).{role}", own, f"shape {shape}"))
 
 
-def _is_layout(value: Any) -> TypeGuard[tuple[Point, ...]]:
-    """Whether these are positions (U, 2): pairs of numbers."""
-    try:
-        first = value[0]
-        return not isinstance(first, str) and isinstance(float(first[0]), float)
-    except (TypeError, ValueError, LookupError):
-        return False
-
-
 def as_batch_size(batch_size: int | Sequence[int]) -> torch.Size:
     """A whole number or a sequence of them, each at least 1."""
-    sizes = (batch_size,) if isinstance(batch_size, int) else batch_size
+    given = plain(batch_size)
+    sizes = given if isinstance(given, tuple) else (given,)
     accepted = "whole numbers >= 1"
-    if not isinstance(sizes, Sequence) or not all(type(size) is int for size in sizes):
+    if not all(type(size) is int for size in sizes):
         raise InputTypeError(rejection("batch_size", batch_size, accepted))
     if any(size < 1 for size in sizes):
         raise InputError(rejection("batch_size", batch_size, accepted))
@@ -101,17 +79,18 @@ def as_schemes(
     scheme: str | Sequence[str], batch_size: torch.Size, num_helpers: int
 ) -> tuple[str, ...]:
     """One scheme for all rows, or one for each row of the batch's first dimension."""
-    if isinstance(scheme, str):
-        fixed_modes(scheme, num_helpers)
-        return (scheme,)
-    if not isinstance(scheme, Sequence):
+    given = plain(scheme)
+    if isinstance(given, str):
+        fixed_modes(given, num_helpers)
+        return (given,)
+    if not isinstance(given, tuple):
         raise InputTypeError(rejection("scheme", scheme, f"one of {', '.join(MODE_RULES)}"))
-    for index, name in enumerate(scheme):
+    for index, name in enumerate(given):
         fixed_modes(name, num_helpers, f"scheme[{index}]")
-    if not batch_size or len(scheme) != batch_size[0]:
+    if not batch_size or len(given) != batch_size[0]:
         rows = batch_size[0] if batch_size else 0
         raise InputError(rejection("scheme", scheme, f"one name, or one for each of {rows} rows"))
-    return tuple(scheme)
+    return given
 
 
 def require_shape(name: str, values: Tensor, shape: Sequence[int]) -> None:

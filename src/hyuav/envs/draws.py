@@ -136,9 +136,9 @@ class Draws:
         """The next slot's numbers, several slots of which are drawn at once, but in a graph."""
         slots = self._slots[name]
         if torch.compiler.is_compiling():
-            numbers = self._numbers(name, self._keys[self._names.index(name)], slots)
             self._slots[name] = slots + 1
-            return numbers
+            numbers = self._numbers(name, self._keys[self._names.index(name)], slots)
+            return numbers.contiguous()  # as they are without a graph, or there would be two
         block, place = divmod(int(slots), self._at_once)
         drawn, numbers = self._blocks.get(name, (-1, self._keys))
         if drawn != block:

@@ -1,7 +1,6 @@
 """Flights told in NumPy's terms: what Gymnasium's two kinds of environment share."""
 
 import copy
-import dataclasses
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -20,10 +19,10 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.envs import TransformedEnv
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
-from hyuav._support.parameters import Count, checked
-from hyuav.envs.arguments import as_scenario
+from hyuav._support.parameters import Count, checked, plain
 from hyuav.envs.recorder import FlightRecorder
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.generators import LayoutGenerator, over_horizon
+from hyuav.physics.scenario import Scenario, as_scenario, is_layout
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -172,10 +171,8 @@ def limit_of_make(env: gymnasium.Env[Any, Any]) -> int | None:
     return spec.max_episode_steps if limit is None and spec is not None else limit
 
 
-def limited(
-    scenario: Scenario | str | Sequence[Scenario | str], max_episode_steps: int | None
-) -> Scenario | str | Sequence[Scenario | str]:
-    """The scenario, or that of each row, with another T; the same for None and -1.
+def limited(scenario: Any, max_episode_steps: int | None) -> Any:
+    """What is flown, or what each row flies, with another T; the same for None and -1.
 
     Raises:
         InputError: ``max_episode_steps`` is no whole number, or below 1.
@@ -183,9 +180,11 @@ def limited(
     if max_episode_steps is None or max_episode_steps == -1:
         return scenario
     num_slots = checked(Count, "max_episode_steps", max_episode_steps)
-    if isinstance(scenario, Scenario | str) or not isinstance(scenario, Sequence):
-        return dataclasses.replace(as_scenario(scenario), num_slots=num_slots)
-    return [dataclasses.replace(as_scenario(each), num_slots=num_slots) for each in scenario]
+    given = plain(scenario)
+    if isinstance(given, tuple) and not is_layout(given):
+        return [over_horizon(as_scenario(each), num_slots) for each in given]
+    whole = given if isinstance(given, LayoutGenerator) else as_scenario(given)
+    return over_horizon(whole, num_slots)
 
 
 def accepted_options(options: object, names: Sequence[str]) -> Mapping[str, Any]:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hyuav._support.errors import InputError, brief, rejection, require_choice
 from hyuav._support.parameters import Count, checked
-from hyuav.envs.arguments import ScenarioLike, as_seed
+from hyuav.envs.arguments import as_seed
 from hyuav.envs.flights import (
     RENDERING,
     Flags,
@@ -28,6 +28,7 @@ from hyuav.envs.flights import (
 )
 from hyuav.envs.transforms import make_env
 from hyuav.physics.generators import LayoutGenerator
+from hyuav.physics.scenario import ScenarioLike
 
 
 class SecureOffloadingGymEnv(Limited, gymnasium.Env[Floats, Floats]):

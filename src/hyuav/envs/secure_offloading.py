@@ -12,8 +12,8 @@ from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from hyuav._support.errors import InputError, rejection
-from hyuav._support.parameters import checked
+from hyuav._support.errors import InputError, InputTypeError, rejection
+from hyuav._support.parameters import checked, plain
 from hyuav.envs.arguments import (
     NODES,
     ScenarioLike,
@@ -104,7 +104,7 @@ class SecureOffloadingEnv(EnvBase):
         scheme: str | Sequence[str] = "hybrid",
         batch_size: int | Sequence[int] = (),
         device: torch.device | str | None = None,
-        seed: int | list[int] | tuple[int, ...] | None = None,
+        seed: int | Sequence[int] | None = None,
         diagnostics: bool = False,
         fading: bool = False,
     ) -> None:
@@ -207,10 +207,9 @@ class SecureOffloadingEnv(EnvBase):
         self.done_spec = Composite(done=flags(1), terminated=flags(1), shape=batch, device=device)
 
     def _set_seed(self, seed: int | list[int] | tuple[int, ...] | None) -> None:
-        if isinstance(seed, list | tuple):
-            own: int | tuple[int, ...] = as_seeds(seed, self.batch_size)
-        else:
-            own = as_seed(seed)
+        given = plain(seed)
+        several = isinstance(given, tuple)
+        own = as_seeds(given, self.batch_size) if several else as_seed(given)
         size = 0 if self.generator is None else self.generator.size
         self.draws = Draws(self.physics, self.batch_size, own, size)
 
@@ -284,6 +283,8 @@ class SecureOffloadingEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         position, action = tensordict["position"], tensordict["action"]
         require_shape("action", action, (*position.shape[:-1], self.scenario.action_size))
+        if action.is_complex():
+            raise InputTypeError(rejection("action", action.dtype, "real numbers"))
         action = action.to(torch.float32)  # as specified, whatever is given
         control = self.physics.control(action, self._norm_limit, self._mode_rule)
         after, outcome, tasks = self._slot(self._nodes(tensordict, position), control)

@@ -8,12 +8,11 @@ from torch import Tensor
 from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
 from hyuav._support.parameters import checked
-from hyuav.envs.arguments import ScenarioLike
 from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.observation import JointView
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.physics.generators import LayoutGenerator
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, ScenarioLike
 
 WITHIN = 1.0 - 1e-6
 """Of half the map's side, as near to the edge as flights should end: rounding leads no further."""
@@ -81,7 +80,7 @@ def make_env(
     scheme: str | Sequence[str] = "hybrid",
     batch_size: int | Sequence[int] = (),
     device: torch.device | str | None = None,
-    seed: int | list[int] | tuple[int, ...] | None = None,
+    seed: int | Sequence[int] | None = None,
     diagnostics: bool = False,
     *,
     fading: bool = False,

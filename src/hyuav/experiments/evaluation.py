@@ -18,13 +18,20 @@ from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.files import write_durably
-from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNumber, parameter
+from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    Parameters,
+    PositiveNumber,
+    mapping,
+    parameter,
+    require_record,
+)
 from hyuav._support.randomness import derived_seed
-from hyuav.envs.arguments import as_scenario
 from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
 from hyuav.learning.policy import Policy
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, as_scenario
 from hyuav.references.optimum import RESOLUTION
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -63,7 +70,7 @@ class Evaluation:
 
 
 def evaluate(
-    scenario: Scenario,
+    scenario: Scenario | str,
     name: str,
     policies: Mapping[str, TensorDictModuleBase | Sequence[TensorDictModuleBase]],
     parameters: EvaluationParameters,
@@ -74,7 +81,7 @@ def evaluate(
     """Fly every scheme through the same draws of fading and tasks.
 
     Args:
-        scenario: node positions and parameters.
+        scenario: node positions and parameters, or the name of a preset.
         name: of the scenario, for the record.
         policies: by scheme, names of :data:`.schemes.SCHEMES`: one or more, as from several seeds,
             that write ``action``. Fractions of the optimum are given where the optima are among
@@ -86,14 +93,15 @@ def evaluate(
     Raises:
         InputError: no scheme, an unknown one, one without a policy, or a policy of another number
             of UEs.
-        InputTypeError: something else than a policy.
+        InputTypeError: an argument of the wrong type.
     """
     scenario = as_scenario(scenario)
-    for scheme in policies:
-        require_choice("scheme", scheme, SCHEMES)
-    if not policies:
+    by_scheme = {
+        scheme: _several(scheme, given) for scheme, given in mapping("policies", policies).items()
+    }
+    if not by_scheme:
         raise InputError(rejection("policies", policies, "at least one scheme"))
-    by_scheme = {scheme: _several(scheme, given) for scheme, given in policies.items()}
+    require_record("parameters", parameters, EvaluationParameters)
     flown = {
         scheme: _together(
             [fly(scenario, scheme, policy, parameters, device) for policy in by_scheme[scheme]]
@@ -120,6 +128,7 @@ def evaluate(
 
 def _several(scheme: str, given: object) -> Sequence[TensorDictModuleBase]:
     """One policy as several."""
+    require_choice("scheme", scheme, SCHEMES)
     several = [given] if isinstance(given, TensorDictModuleBase) else given
     line = rejection(f"policies[{scheme!r}]", given, "at least one policy")
     if not isinstance(several, Sequence):

@@ -15,14 +15,13 @@ from torchrl.envs import TransformedEnv
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.parameters import Count, checked
-from hyuav.envs.arguments import as_scenario
 from hyuav.envs.observation import ObservationLayout
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, made_on
 from hyuav.learning.export import export
 from hyuav.learning.weights import load_weights, select_learners
 from hyuav.physics.modes import MODE_RULES
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, as_scenario
 
 Observed = TypeVar("Observed", Tensor, NDArray[Any], TensorDictBase)
 

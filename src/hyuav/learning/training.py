@@ -24,18 +24,20 @@ from hyuav._support.parameters import (
     Threads,
     checked,
     parameter,
+    require_record,
 )
 from hyuav._support.recording import COMPILATION_ERRORS, has_compiler
 from hyuav.envs.arguments import as_device
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import require_entries, require_like
 from hyuav.learning.compile import FlownEpisode
+from hyuav.learning.learners import as_learners
 from hyuav.learning.memory import require_memory
 from hyuav.learning.policy import NoiseFreeReturn, Policy, learned_policy
 from hyuav.learning.train import Cohort, Learner
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learners
 from hyuav.physics.generators import LayoutGenerator, over_horizon
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import ScenarioLike, as_scenario
 
 COMPILE_SECONDS = 20.0
 """What compiling one program takes."""
@@ -102,9 +104,10 @@ class Training:
     whatever the process does besides, up to the rounding of differently arranged sums.
 
     Args:
-        scenario: node positions and parameters; or what draws layouts anew in each episode, such as
-            a :class:`hyuav.LayoutFamily`, for algorithms that need not know them beforehand.
-        learners: one or more.
+        scenario: node positions and parameters, or the name of a preset; or what draws layouts
+            anew in each episode, such as a :class:`hyuav.LayoutFamily`, for algorithms that need
+            not know them beforehand.
+        learners: one or more; or their seeds, or how many, with seeds from 0 on.
         algorithm: which one, with its hyperparameters.
         parameters: how long and on what to learn.
         device: of all tensors.
@@ -117,26 +120,25 @@ class Training:
 
     def __init__(
         self,
-        scenario: Scenario | LayoutGenerator,
-        learners: Sequence[Learner],
+        scenario: ScenarioLike | LayoutGenerator,
+        learners: int | Learner | Sequence[int | Learner],
         algorithm: AlgorithmParameters,
         parameters: TrainingParameters,
         device: torch.device | str | None = None,
     ) -> None:
-        of_learners = isinstance(learners, list | tuple) and all(
-            isinstance(learner, Learner) for learner in learners
-        )
-        if not of_learners or not learners:
-            raise InputTypeError(rejection("learners", learners, "a list of at least one Learner"))
         if not isinstance(algorithm, AlgorithmParameters):
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
-        if isinstance(scenario, LayoutGenerator) and algorithm.knows_layout:
-            accepted = "one without afterstate and guide, which know one layout, such as DDPG()"
-            raise InputError(rejection("algorithm", type(algorithm).__name__, accepted))
-        fixed = scenario.scenario if isinstance(scenario, LayoutGenerator) else scenario
-        self.scenario, self.parameters = fixed, parameters
+        require_record("parameters", parameters, TrainingParameters)
+        if isinstance(scenario, LayoutGenerator):
+            if algorithm.knows_layout:
+                accepted = "one without afterstate and guide, which know one layout, such as DDPG()"
+                raise InputError(rejection("algorithm", type(algorithm).__name__, accepted))
+            self.scenario = scenario.scenario
+        else:
+            self.scenario = scenario = as_scenario(scenario)
+        self.parameters = parameters
         self._algorithm = algorithm
-        self.learners = tuple(learners)
+        self.learners = as_learners(learners)
         device = as_device(device)
         on_cpu = device.type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
@@ -144,7 +146,7 @@ class Training:
         if parameters.replay_size < algorithm.least_replay(longest):
             accepted = f"at least the {longest} slots of a flight, to keep the best"
             raise InputError(rejection("replay_size", parameters.replay_size, accepted))
-        needs = algorithm.needed_memory(fixed, self.horizons, parameters.sizes)
+        needs = algorithm.needed_memory(self.scenario, self.horizons, parameters.sizes)
         require_memory(needs, len(self.learners), device)
         self._members = _partition(self.horizons, parameters.cohorts if on_cpu else 1, size)
         order = [index for members in self._members for index in members]
@@ -152,7 +154,7 @@ class Training:
         self.cohorts = [
             Cohort(
                 over_horizon(scenario, self.horizons[members[0]]),
-                [learners[index] for index in members],
+                [self.learners[index] for index in members],
                 algorithm,
                 parameters.replay_size,
                 parameters.batch_size,

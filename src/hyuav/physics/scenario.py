@@ -1,11 +1,12 @@
 """What is fixed in an experiment: the node positions and the paper's parameter table."""
 
-from typing import Annotated, Any, Self
+from collections.abc import Sequence
+from typing import Annotated, Any, Self, TypeGuard
 
 from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
-from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.parameters import Fraction, Number, OneOf, Parameters, parameter
 
 LARGEST_LOAD = 1e30
@@ -199,3 +200,33 @@ class Scenario(Parameters):
         """
         require_choice("scenario", name, PRESETS)
         return cls(ue_positions=PRESETS[name])
+
+
+ScenarioLike = Scenario | str | Sequence[Point]
+"""A scenario, a preset's name, or UE positions in m, all else being as in the paper."""
+
+
+def as_scenario(scenario: object) -> Scenario:
+    """A scenario as it is, the preset of that name, or the paper's with these UE positions.
+
+    Raises:
+        InputError: there is none of that name, or positions are not accepted.
+        InputTypeError: it is none of these.
+    """
+    if isinstance(scenario, str):
+        return Scenario.preset(scenario)
+    if is_layout(scenario):
+        return Scenario(ue_positions=scenario)
+    if not isinstance(scenario, Scenario):
+        accepted = "a Scenario, a preset's name or UE positions"
+        raise InputTypeError(rejection("scenario", scenario, accepted))
+    return scenario
+
+
+def is_layout(value: Any) -> TypeGuard[tuple[Point, ...]]:
+    """Whether these are positions (U, 2): pairs of numbers."""
+    try:
+        first = value[0]
+        return not isinstance(first, str) and isinstance(float(first[0]), float)
+    except (TypeError, ValueError, LookupError):
+        return False

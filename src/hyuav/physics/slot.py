@@ -11,7 +11,7 @@ from hyuav.physics.channel import LinkRow, Links
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import ModeRule
 from hyuav.physics.prospects import warn_of_what_cannot_earn
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, as_scenario
 from hyuav.physics.tasks import Tasks
 
 
@@ -133,7 +133,7 @@ class Physics:
     """The scenario's constants on a device.
 
     Args:
-        scenario: node positions and parameters.
+        scenario: node positions and parameters, or the name of a preset.
         device: of all tensors.
         dtype: float32 or float64.
         nodes: where the nodes are before the first slot, where that is not the scenario's layout
@@ -146,14 +146,14 @@ class Physics:
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: Scenario | str,
         device: torch.device | str | None = None,
         dtype: torch.dtype = torch.float32,
         nodes: Nodes | None = None,
         *,
         layout_is_known: bool = True,
     ) -> None:
-        self.scenario = scenario
+        self.scenario = scenario = as_scenario(scenario)
         self.device = torch.device(device) if device is not None else torch.device("cpu")
         self.dtype = dtype
         self.nodes = Nodes.of(scenario, self.device, dtype) if nodes is None else nodes

@@ -1,12 +1,15 @@
 """A path as it is flown: in an environment, and where float32 rounds."""
 
+import numpy as np
 import torch
 import torch.nn.functional as F  # noqa: N812
+from numpy.typing import ArrayLike
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from hyuav.physics.scenario import Scenario
+from hyuav._support.errors import InputError, InputTypeError, rejection
+from hyuav.physics.scenario import ScenarioLike, as_scenario
 from hyuav.physics.slot import Physics
 
 
@@ -19,9 +22,14 @@ class FlightPolicy(TensorDictModuleBase):
     flown.
 
     Args:
-        path: (T + 1, H, 2) m, such as :attr:`Optimum.path`.
-        scenario: whose speed, slot duration and power range the environment has.
+        path: (T + 1, H, 2) m, such as :attr:`Optimum.path`; a tensor, an array or lists.
+        scenario: whose speed, slot duration and power range the environment has, or the name of a
+            preset.
         power: (T, H), in units of the nominal power, such as :attr:`Optimum.share`; None for that.
+
+    Raises:
+        InputError: a path of another shape.
+        InputTypeError: an argument of the wrong type.
 
     Example:
         >>> optimum = solve_optimum("two_clusters", ["hybrid"])["hybrid"]
@@ -32,8 +40,18 @@ class FlightPolicy(TensorDictModuleBase):
     in_keys = ("position", "step_count")
     out_keys = ("action",)
 
-    def __init__(self, path: Tensor, scenario: Scenario, power: Tensor | None = None) -> None:
+    def __init__(
+        self, path: Tensor | ArrayLike, scenario: ScenarioLike, power: Tensor | None = None
+    ) -> None:
         super().__init__()
+        scenario, given = as_scenario(scenario), path
+        accepted = f"positions in m of shape (T + 1, {scenario.num_helpers}, 2)"
+        try:
+            path = path if isinstance(path, Tensor) else torch.from_numpy(np.array(path, float))
+        except (TypeError, ValueError):
+            raise InputTypeError(rejection("path", given, accepted)) from None
+        if path.ndim != 3 or path.shape[1:] != (scenario.num_helpers, 2) or not len(path):
+            raise InputError(rejection("path", tuple(path.shape), accepted))
         self.register_buffer("path", path.to(torch.float64))
         self.step_length = scenario.max_speed * scenario.slot_duration
         self.register_buffer("power", None)

@@ -23,10 +23,10 @@ from pydantic import Field
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection
-from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked
-from hyuav.envs.arguments import ScenarioLike, as_scenario, as_seed
+from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked, plain
+from hyuav.envs.arguments import as_seed
 from hyuav.physics.modes import MODE_RULES, fixed_modes
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, ScenarioLike, as_scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.bounds import CellBounds
 from hyuav.references.flight import flyable
@@ -177,6 +177,7 @@ def solve_horizons(
     longest = max(scenarios)
     draws = checked(_Draws, "draws", draws)
     evaluation_draws = checked(_Draws, "evaluation_draws", evaluation_draws)
+    resolution = plain(resolution)
     require_resolution(resolution, scenario.map_side, longest)
     root = torch.Generator().manual_seed(as_seed(seed))
     map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root, device="cpu").tolist()
@@ -216,9 +217,10 @@ def solve_horizons(
 
 
 def _with_horizons(scenario: Scenario, horizons: Sequence[int]) -> dict[int, Scenario]:
-    if not isinstance(horizons, Sequence | range) or not horizons:
+    numbers = plain(horizons)
+    if not isinstance(numbers, tuple) or not numbers:
         raise InputError(rejection("horizons", horizons, "at least one whole number >= 1"))
-    return {n: dataclasses.replace(scenario, num_slots=n) for n in horizons}
+    return {n: dataclasses.replace(scenario, num_slots=n) for n in numbers}
 
 
 def require_resolution(resolution: float, map_side: float, num_slots: int) -> None:

@@ -9,7 +9,7 @@ from tensordict.nn import TensorDictModuleBase
 
 from hyuav._support.errors import InputError
 from hyuav.physics.energy import budget_speeds
-from hyuav.physics.scenario import Point, Scenario
+from hyuav.physics.scenario import Point, Scenario, ScenarioLike, as_scenario
 
 
 def relay_destination(scenario: Scenario) -> Point:
@@ -75,12 +75,14 @@ class ConstantVelocity(TensorDictModuleBase):
         return tensordict
 
 
-def re_lt(scenario: Scenario) -> ConstantVelocity:
-    """Relay mode with a linear trajectory (Re-LT)."""
+def re_lt(scenario: ScenarioLike) -> ConstantVelocity:
+    """Relay mode with a linear trajectory (Re-LT), in a scenario or a preset of that name."""
+    scenario = as_scenario(scenario)
     destination = relay_destination(scenario)
     return ConstantVelocity(scenario, [destination] * scenario.num_helpers, "relay")
 
 
-def ja_lt(scenario: Scenario) -> ConstantVelocity:
-    """Jamming mode with a linear trajectory (Ja-LT)."""
+def ja_lt(scenario: ScenarioLike) -> ConstantVelocity:
+    """Jamming mode with a linear trajectory (Ja-LT), in a scenario or a preset of that name."""
+    scenario = as_scenario(scenario)
     return ConstantVelocity(scenario, jamming_destinations(scenario), "jamming")
