@@ -15,7 +15,6 @@ from hyuav import (
     InputTypeError,
     LayoutFamily,
     Learner,
-    Policy,
     RobustDDPG,
     Training,
     TrainingParameters,
@@ -23,7 +22,7 @@ from hyuav import (
     solve_optimum,
 )
 from hyuav.learning.algorithm import AlgorithmParameters
-from hyuav.learning.policy import LearnedPolicy
+from hyuav.learning.policy import learned_policy
 
 FAMILY = LayoutFamily(DiskLayout(num_ues=6))
 FEW = TrainingParameters(
@@ -79,9 +78,9 @@ def test_compiled_slots_learn_over_the_same_layouts() -> None:
 def test_what_was_learned_flies_over_any_layout_of_as_many_ues() -> None:
     training = Training(FAMILY, LEARNERS[:1], SMALL, FEW)
     train(training)
-    policy = LearnedPolicy(FAMILY.scenario, SMALL, training.best_weights)
+    policy = learned_policy(FAMILY.scenario, SMALL, training.best_weights)
     parameters = EvaluationParameters(episodes=3, flights=1)
-    found = evaluate(FAMILY.scenario, "example", {"proposed": [Policy(policy)]}, parameters)
+    found = evaluate(FAMILY.scenario, "example", {"proposed": [policy]}, parameters)
     assert found.summary["schemes"]["proposed"]["learners"] == 1
 
 

@@ -16,7 +16,6 @@ from hyuav._support.errors import InputError, InputTypeError, rejection
 from hyuav._support.parameters import checked, plain
 from hyuav.envs.arguments import (
     NODES,
-    ScenarioLike,
     as_device,
     as_scenarios,
     as_schemes,
@@ -31,7 +30,7 @@ from hyuav.envs.recorder import FlightRecorder
 from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import ModeRule
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Scenario, ScenarioLike
 from hyuav.physics.slot import Control, Physics, SlotOutcome, slot
 from hyuav.physics.tasks import Tasks
 
@@ -206,7 +205,7 @@ class SecureOffloadingEnv(EnvBase):
         self.reward_spec = numbers(1)
         self.done_spec = Composite(done=flags(1), terminated=flags(1), shape=batch, device=device)
 
-    def _set_seed(self, seed: int | list[int] | tuple[int, ...] | None) -> None:
+    def _set_seed(self, seed: int | Sequence[int] | None) -> None:
         given = plain(seed)
         several = isinstance(given, tuple)
         own = as_seeds(given, self.batch_size) if several else as_seed(given)
