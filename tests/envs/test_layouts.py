@@ -22,7 +22,8 @@ def test_a_list_of_scenarios_is_a_row_each() -> None:
 
 def test_presets_scenarios_and_positions_may_stand_beside_each_other() -> None:
     drawn = clusters([4, 6], seed=1)
-    env = make_env(["two_clusters", Scenario(ue_positions=drawn), drawn, np.array(drawn)])
+    mixed: list[Any] = ["two_clusters", Scenario(ue_positions=drawn), drawn, np.array(drawn)]
+    env = make_env(mixed)
     assert env.batch_size == (4,)
     assert env.base_env.scenarios[0] == Scenario.preset("two_clusters")
     assert len(set(env.base_env.scenarios[1:])) == 1
