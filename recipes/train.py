@@ -2,6 +2,7 @@
 
 hyuav train scenario=two_clusters scheme=hybrid algorithm=ddpg seed=0
 hyuav train scheme=[hybrid,relay,jamming] num_slots=[10,20] learners=10
+hyuav train scenario=disk scenario.num_ues=12 scenario.seed=3
 hyuav train resume=runs/NAME
 hyuav train resume=runs/NAME training.num_episodes=2000
 """

@@ -177,7 +177,8 @@ def test_the_compiled_environment_draws_the_same_layouts() -> None:
 
 
 def test_gymnasium_gives_each_episode_a_layout_of_its_own() -> None:
-    env: Any = gymnasium.make("hyuav/SecureOffloading-v0", scenario=FAMILY, render_mode="rgb_array")
+    name = "hyuav/SecureOffloading-v0"
+    env: Any = gymnasium.make(name, scenario=FAMILY, render_mode="rgb_array")
     first, _ = env.reset(seed=0)
     frame = env.render()
     second, _ = env.reset()

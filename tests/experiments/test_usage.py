@@ -48,7 +48,7 @@ def test_defaults_groups_and_sections_are_told(
     monkeypatch.setattr(start, "called", ["hyuav", "train"])
     call("train", "-h")
     lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
-    assert "scenario=two_clusters or random_disk" in lines
+    assert "scenario=two_clusters or clusters, disk, random_disk, random_layout" in lines
     assert "logger=wandb or none, tensorboard" in lines
     assert "logger library, mode, project, entity, group, job_type, name, tags, id" in lines
 
