@@ -83,7 +83,12 @@ def flights() -> Any:
     brought = []
     for scenario, options in ((SCENARIO, {"seed": 3}), (FULL_EDGE, {"seed": [1, 2, 3]})):
         schemes = ["hybrid", "relay", "jamming"]
-        more = {"diagnostics": True, "fading": True, "clock": True, "geofence": True}
+        more: dict[str, Any] = {
+            "diagnostics": True,
+            "fading": True,
+            "clock": True,
+            "geofence": True,
+        }
         env = make_env(scenario, schemes, 3, **options, **more)
         state = env.reset()
         for _ in range(7):
@@ -95,7 +100,7 @@ def flights() -> Any:
 
 
 def gymnasiums() -> Any:
-    one = gymnasium.make("hyuav/SecureOffloading-v0", scenario=SCENARIO, clock=True)
+    one: Any = gymnasium.make("hyuav/SecureOffloading-v0", scenario=SCENARIO, clock=True)
     many = gymnasium.make_vec("hyuav/SecureOffloading-v0", 3, scenario=SCENARIO, clock=True)
     brought = [one.observation_space.high, one.reset(seed=1), many.reset(seed=2)]
     for _ in range(5):
@@ -140,7 +145,8 @@ def trained(name: str, compiled: str = "never") -> Any:
     training = Training(SCENARIO, [Learner("relay", 1)], algorithm, parameters)
     episodes = list(training.episodes())
     policy = LearnedPolicy(SCENARIO, algorithm, training.best_weights)
-    env = make_env(SCENARIO, batch_size=2, seed=0, **algorithm.environment)
+    observed: dict[str, Any] = algorithm.environment
+    env = make_env(SCENARIO, batch_size=2, seed=0, **observed)
     action = policy(env.reset())["action"]
     return episodes, training.state_dict(), action
 

@@ -8,8 +8,8 @@ import torch
 
 from hyuav import DDPG, InputError, InputTypeError, Learner, Training, TrainingParameters
 
-SMALL, SHORT = DDPG(hidden_sizes=[4]), TrainingParameters(num_episodes=1)
-SAID = {
+SMALL, SHORT = DDPG(hidden_sizes=(4,)), TrainingParameters(num_episodes=1)
+SAID: dict[str, tuple[Any, tuple[int, ...]]] = {
     "a count": (3, (0, 1, 2)),
     "NumPy's count": (np.int64(2), (0, 1)),
     "a learner": (Learner(seed=7), (7,)),

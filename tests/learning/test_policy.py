@@ -1,10 +1,13 @@
 import dataclasses
+from typing import Any
 
 import pytest
 import torch
+from tensordict import TensorDictBase
+from torchrl.envs import EnvBase
 
 from batches import TEN_UES
-from hyuav import InputError, Scenario, make_env
+from hyuav import InputError, RobustDDPG, Scenario, make_env
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.weights import copy_weights
@@ -50,3 +53,25 @@ def test_an_actor_of_other_ues_is_refused() -> None:
     fewer = dataclasses.replace(SCENARIO, ue_positions=SCENARIO.ue_positions[:4])
     with pytest.raises(InputError, match="checkpoint"):
         LearnedPolicy(fewer, algorithm, weights)
+
+
+def test_a_slot_of_a_learned_policy_is_one_graph_that_is_made_once() -> None:
+    algorithm = RobustDDPG(hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(1, TEN_UES).loss)
+    policy = LearnedPolicy(TEN_UES, algorithm, weights)
+    flown = []
+    for compiled in (False, True):
+        observed: dict[str, Any] = algorithm.environment
+        env = make_env(TEN_UES, batch_size=3, seed=1, **observed)
+
+        def fly_slot(state: TensorDictBase, env: EnvBase = env) -> TensorDictBase:
+            return env.step_mdp(env.step(policy(state)))
+
+        state = fly_slot(env.reset())
+        if compiled:
+            fly_slot = torch.compile(fly_slot, fullgraph=True, backend="eager")
+        for slot in range(4):
+            with torch.compiler.set_stance("fail_on_recompile" if slot > 0 else "default"):
+                state = fly_slot(state)
+        flown.append(state["episode_reward"])
+    torch.testing.assert_close(*flown)

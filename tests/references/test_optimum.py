@@ -315,8 +315,10 @@ def test_numbers_and_paths_of_any_kind_are_taken() -> None:
         "evaluation_draws": torch.tensor(2),
         "seed": np.uint8(3),
     }
-    for resolution in (np.float32(20.0), torch.tensor(20), np.int64(20)):
-        found = solve_optimum("two_clusters", np.array(["relay"]), resolution=resolution, **few)
+    rules: Any = np.array(["relay"])
+    resolutions: list[Any] = [np.float32(20.0), torch.tensor(20), np.int64(20)]
+    for resolution in resolutions:
+        found = solve_optimum("two_clusters", rules, resolution=resolution, **few)
         assert found["relay"].resolution == 20
     path = found["relay"].path
     for given in (path.numpy(), path.tolist()):
