@@ -15,7 +15,7 @@ from tensordict.nn import TensorDictModule
 from torch import nn
 
 from batches import TEN_UES
-from hyuav import InputError, Policy, Scenario, make_env, re_lt
+from hyuav import InputError, Policy, RobustDDPG, Scenario, make_env, re_lt
 from hyuav.learning.policy import learned_policy
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.weights import copy_weights
@@ -312,3 +312,25 @@ def test_pytorch_exports_a_policy(name: str) -> None:
     for rows in (1, 2, 7):
         observed = torch.rand(rows, size)
         torch.testing.assert_close(program(observed), policy.act(observed))
+
+
+def test_a_slot_of_a_learned_policy_is_one_graph_that_is_made_once() -> None:
+    algorithm = RobustDDPG(hidden_sizes=(8,))
+    weights = copy_weights(algorithm.build(1, TEN_UES).loss)
+    policy = learned_policy(TEN_UES, algorithm, weights)
+    flown = []
+    for compiled in (False, True):
+        observed: dict[str, Any] = algorithm.environment
+        env = make_env(TEN_UES, batch_size=3, seed=1, **observed)
+
+        def fly_slot(state: Any, env: Any = env) -> Any:
+            return env.step_mdp(env.step(policy(state)))
+
+        state = fly_slot(env.reset())
+        if compiled:
+            fly_slot = torch.compile(fly_slot, fullgraph=True, backend="eager")
+        for slot in range(4):
+            with torch.compiler.set_stance("fail_on_recompile" if slot > 0 else "default"):
+                state = fly_slot(state)
+        flown.append(state["episode_reward"])
+    torch.testing.assert_close(*flown)
