@@ -19,8 +19,8 @@ def taken(rates: list[float], rule: ModeRule) -> int:
 
 
 def test_modes_are_counted_with_the_first_helper_as_the_lowest_digit() -> None:
-    assert mode_vectors(1) == [(False,), (True,)]
-    assert mode_vectors(2) == [(False, False), (True, False), (False, True), (True, True)]
+    assert mode_vectors(1) == ((False,), (True,))
+    assert mode_vectors(2) == ((False, False), (True, False), (False, True), (True, True))
 
 
 def test_relaying_needs_a_strictly_larger_sum_rate() -> None:

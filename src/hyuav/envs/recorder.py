@@ -16,7 +16,8 @@ MOST_SLOTS = 10_000
 class FlightRecorder:
     """The flights of the first rows of a batch since their last reset, for pictures of them.
 
-    What is kept stays on its device until a picture is drawn.
+    What is kept stays on its device until a picture is drawn. Of a batch that is kept whole it is
+    what the environment returned, not a copy, so that a slot costs nothing.
 
     Args:
         rows: how many rows to keep; those of a batch of several dimensions count through all.
@@ -25,9 +26,11 @@ class FlightRecorder:
 
     def __init__(self, rows: int, num_slots: int) -> None:
         self.rows = rows
-        self._slots: deque[dict[str, Tensor]] = deque(maxlen=min(num_slots, MOST_SLOTS) + 1)
-        self._flown: Tensor | None = None
-        """(rows,) slots since the last reset."""
+        self._slots: deque[TensorDictBase] = deque(maxlen=min(num_slots, MOST_SLOTS) + 1)
+        self._count = 0
+        """Of the slots flown since all rows were reset."""
+        self._begun: list[int] = []
+        """How many they were when each row was last reset."""
 
     def start(self, entries: TensorDictBase, chosen: Tensor | None = None) -> None:
         """Begin flights anew, where nothing is chosen in all rows.
@@ -37,25 +40,23 @@ class FlightRecorder:
             chosen: (*B, 1) bool, the rows that begin anew; the others fly on.
         """
         begun = self._first_rows(entries)
-        if chosen is None or self._flown is None:
+        rows = begun.numel()
+        if chosen is None or not self._slots:
             self._slots.clear()
-            mode = begun["mode"]
-            self._flown = torch.zeros(len(mode), dtype=torch.int64, device=mode.device)
+            self._count, self._begun = 0, [0] * rows
         else:
-            anew = chosen.reshape(-1)[: self.rows]
-            last = self._slots.pop()
-            begun = {
-                name: torch.where(anew.reshape(-1, *(1,) * (own.ndim - 1)), own, last[name])
-                for name, own in begun.items()
-            }
-            self._flown = self._flown.masked_fill(anew, 0)
+            anew = chosen.reshape(-1)[:rows]
+            last = _in_rows(self._slots.pop())
+            begun = _in_rows(begun).where(anew, last)
+            pairs = zip(self._begun, anew.tolist(), strict=True)
+            self._begun = [self._count if new else before for before, new in pairs]
         self._slots.append(begun)
 
     def add(self, entries: TensorDictBase) -> None:
-        """Add a slot: what is observed after it, (*B,)."""
-        if self._flown is not None:
+        """Add a slot: what is observed after it, (*B,). A graph of a slot keeps nothing."""
+        if self._slots and not torch.compiler.is_compiling():
             self._slots.append(self._first_rows(entries))
-            self._flown = self._flown + 1
+            self._count += 1
 
     def flight(self, row: int) -> tuple[Tensor, Tensor, int]:
         """One row's latest slots: positions (t + 1, H, 2) m, modes (t + 1, H), the slots flown.
@@ -65,32 +66,32 @@ class FlightRecorder:
         Raises:
             InputError: nothing has been flown yet, or ``row`` is not kept.
         """
-        if self._flown is None:
+        if not self._slots:
             raise InputError("nothing to draw: call reset() before render()")
-        if not 0 <= row < len(self._flown):
-            accepted = f"a row that is kept, 0 to {len(self._flown) - 1}"
+        if not 0 <= row < len(self._begun):
+            accepted = f"a row that is kept, 0 to {len(self._begun) - 1}"
             raise InputError(rejection("row", row, accepted))
-        flown = int(self._flown[row])
-        slots = list(self._slots)[-1 - flown :]
+        flown = self._count - self._begun[row]
+        slots = [_in_rows(entries) for entries in list(self._slots)[-1 - flown :]]
         positions, modes = (
-            torch.stack([entries[name][row] for entries in slots]).cpu()
+            torch.stack([entries[name][row] for entries in slots]).detach().cpu()
             for name in ("position", "mode")
         )
         return positions, modes, flown
 
     def nodes(self, row: int) -> dict[str, list[list[float]]]:
         """Where the nodes that do not fly are in one row's episode, where they are drawn: in m."""
-        latest = self._slots[-1]
-        return {name: latest[name][row].tolist() for name in NODES if name in latest}
+        latest = _in_rows(self._slots[-1])
+        return {name: own[row].tolist() for name, own in latest.items() if name in NODES}
 
-    def _first_rows(self, entries: TensorDictBase) -> dict[str, Tensor]:
-        """Copies (rows, ...), because whoever flies may write to what was returned."""
-        batch = entries.batch_size
-        return {
-            name: entries[name]
-            .detach()
-            .reshape(-1, *entries[name].shape[len(batch) :])[: self.rows]
-            .clone()
-            for name in ("position", "mode", *NODES)
-            if name in entries.keys()  # noqa: SIM118 - a tensordict's own test is by its keys
-        }
+    def _first_rows(self, entries: TensorDictBase) -> TensorDictBase:
+        """What is kept of them."""
+        if entries.numel() <= self.rows:
+            return entries
+        kept = entries.select("position", "mode", *NODES, strict=False)
+        return kept.reshape(-1)[: self.rows].clone()
+
+
+def _in_rows(entries: TensorDictBase) -> TensorDictBase:
+    """The entries that are drawn, (rows,)."""
+    return entries.select("position", "mode", *NODES, strict=False).reshape(-1)

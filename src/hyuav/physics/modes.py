@@ -1,6 +1,7 @@
 """In which modes the helpers work: the argmax of Algorithm 1, over all that they can do."""
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Annotated, NamedTuple
 
 import torch
@@ -10,12 +11,13 @@ from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.parameters import OneOf
 
 
-def mode_vectors(num_helpers: int) -> list[tuple[bool, ...]]:
+@cache
+def mode_vectors(num_helpers: int) -> tuple[tuple[bool, ...], ...]:
     """All modes (k_1, ..., k_H) of the helpers, True where one relays, by sum_i k_i 2^(i - 1)."""
-    return [
+    return tuple(
         tuple(bool(number >> helper & 1) for helper in range(num_helpers))
         for number in range(2**num_helpers)
-    ]
+    )
 
 
 class ModeRule(NamedTuple):
@@ -79,14 +81,14 @@ def fixed_modes(mode_rule: str, num_helpers: int, name: str = "scheme") -> tuple
     raise InputError(rejection(name, mode_rule, accepted))
 
 
-def allowed_vectors(mode_rule: str, num_helpers: int) -> list[tuple[bool, ...]]:
+def allowed_vectors(mode_rule: str, num_helpers: int) -> tuple[tuple[bool, ...], ...]:
     """The modes that a rule allows, in the order of :func:`mode_vectors`.
 
     Raises:
         InputError: as :func:`fixed_modes`.
     """
     fixed = fixed_modes(mode_rule, num_helpers)
-    return mode_vectors(num_helpers) if fixed is None else [fixed]
+    return mode_vectors(num_helpers) if fixed is None else (fixed,)
 
 
 def beats(sum_rate: Tensor, best: Tensor, rule: ModeRule, mode: int) -> Tensor:

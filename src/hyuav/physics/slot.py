@@ -57,6 +57,8 @@ class SlotOutcome(NamedTuple):
     last one that was taken is the chosen one."""
     sum_rate: Tensor
     """The secrecy sum-rate in the chosen modes: (..., 1) bps/Hz."""
+    relays: Tensor
+    """(..., H) bool, which helpers relay; the others jam."""
 
     @property
     def relay(self) -> ModeOutcome:
@@ -67,13 +69,6 @@ class SlotOutcome(NamedTuple):
     def jamming(self) -> ModeOutcome:
         """What it brings if all helpers jam."""
         return self.modes[0]
-
-    @property
-    def relays(self) -> Tensor:
-        """(..., H) bool, which helpers relay; the others jam."""
-        vectors = modes.mode_vectors(self.control.velocity.shape[-2])
-        device = self.sum_rate.device
-        return self._chosen([torch.tensor(vector, device=device) for vector in vectors])
 
     @property
     def offloading(self) -> Tensor:
@@ -162,6 +157,11 @@ class Physics:
         """Of all links, (link_row.size,), as power ratios."""
         self._pays_for_relaying = energy.ue_can_pay(scenario, relay=True)
         self._sent = self._nominal()
+        self.mode_vectors = [
+            torch.tensor(vector, device=self.device)
+            for vector in modes.mode_vectors(scenario.num_helpers)
+        ]
+        """What :func:`hyuav.physics.modes.mode_vectors` lists, each (H,) bool."""
         self.edge_can_saturate = energy.edge_can_saturate(scenario)
         """Whether the largest tasks of all UEs together would exceed the edge's budget E_L."""
         self._standing = self._stand(self.nodes)
@@ -406,10 +406,12 @@ def slot(
     gains = geometry.gains.faded(fading)
     outcomes = physics.outcomes(geometry, gains, tasks, control.power)
     taken = []
-    best = outcomes[0].sum_rate.unsqueeze(-1)
+    best, relays = outcomes[0].sum_rate.unsqueeze(-1), physics.mode_vectors[0]
     for number, outcome in enumerate(outcomes[1:], start=1):
         sum_rate = outcome.sum_rate.unsqueeze(-1)
         taken.append(modes.beats(sum_rate, best, control.mode_rule, number))
         best = torch.where(taken[-1], sum_rate, best)
-    distances = geometry.distances
-    return SlotOutcome(nodes, control, moved.off_map, distances, outcomes, tuple(taken), best)
+        relays = torch.where(taken[-1], physics.mode_vectors[number], relays)
+    return SlotOutcome(
+        nodes, control, moved.off_map, geometry.distances, outcomes, tuple(taken), best, relays
+    )
