@@ -62,6 +62,7 @@ UNREADABLE = [
     ("evaluate", "runs/NAME", "expected NAME=VALUE (did you mean 'run=runs/NAME'?)"),
     ("train", "scheme", "expected NAME=VALUE"),
     ("train", "=3", "expected NAME=VALUE"),
+    ("evaluate", "hydra.mode=MULTIRUN", "this recipe does a single job: leave it out"),
 ]
 
 

@@ -10,7 +10,7 @@ from hydra.core.config_store import ConfigStore
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import ChoiceSweep
 from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
-from omegaconf import MISSING, DictConfig
+from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
 
 from hyuav._support.errors import (
@@ -34,6 +34,9 @@ OTHERWISE = {
 }
 """Words of some recipes or of an earlier version, and what the same is called in others or now."""
 
+SEVERAL = {"-m", "--multirun", "hydra.mode=MULTIRUN"}
+"""Words that ask for a job for each of several values."""
+
 
 def members_of(group: str) -> list[str]:
     """What a group offers, by name."""
@@ -52,9 +55,9 @@ class Vocabulary:
     def __init__(self, node: Mapping[str, Any], groups: Mapping[str, str]) -> None:
         self._groups, self._once = groups, node["hydra"]["run"]["dir"] == "."
         repository = ConfigStore.instance().repo
-        self._members = {
+        self._members: dict[str, dict[str, Any]] = {
             group: {
-                name.removesuffix(".yaml"): each.node
+                name.removesuffix(".yaml"): OmegaConf.to_container(each.node)
                 for name, each in repository[group].items()
                 if hasattr(each, "node")  # and is no group within the group
             }
@@ -74,7 +77,7 @@ class Vocabulary:
                 list; a group without a member, or with a list of them; several jobs where there is
                 no directory for each.
         """
-        several = not {"-m", "--multirun"}.isdisjoint(words := list(words))
+        several = not SEVERAL.isdisjoint(words := list(words))
         if several and self._once:
             raise InputError("-m: this recipe does a single job: leave it out")
         for word in words:
