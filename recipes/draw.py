@@ -19,7 +19,7 @@ from hyuav._support.files import require_writable
 from hyuav._support.parameters import OneOrMore, Parameters, Text, ZeroOrMore, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
-from hyuav.experiments.own_algorithms import OwnAlgorithm
+from hyuav.experiments.own_code import OwnAlgorithm
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.paper.gallery import FigureName, draw
 

@@ -37,7 +37,7 @@ from hyuav.experiments.evaluation import (
     evaluate,
 )
 from hyuav.experiments.evaluation_table import print_results
-from hyuav.experiments.own_algorithms import OwnAlgorithm
+from hyuav.experiments.own_code import OwnAlgorithm
 from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation

@@ -18,7 +18,7 @@ from hyuav._support.errors import InputError
 from hyuav._support.parameters import OneOrMore, Parameters, Text, Threads, ZeroOrMore, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
-from hyuav.experiments.own_algorithms import OwnAlgorithm
+from hyuav.experiments.own_code import OwnAlgorithm
 from hyuav.viz.html.page import write_report
 
 

@@ -28,6 +28,7 @@ from hyuav._support.parameters import (
     mapping,
     parameter,
 )
+from hyuav._support.registry import is_reference
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import (
     Config,
@@ -42,7 +43,6 @@ from hyuav.experiments.initial_weights import saved_weights
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train_or_resume
-from hyuav.learning.registry import is_reference
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.offloading import ModeRuleName

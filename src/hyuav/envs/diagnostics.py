@@ -54,22 +54,11 @@ def diagnose(
         edge_load: (..., 1) cycles that the edge server took in the previous slot.
     """
     cpu_cycles, offloading = tasks.cpu_cycles, slot.offloading
-    duration, num_ues, power = scenario.slot_duration, scenario.num_ues, slot.control.power
-    sending = torch.where(
-        slot.relays,
-        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=True),
-        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=False),
-    )
+    duration = scenario.slot_duration
     local = energy.computation_energy(cpu_cycles / duration, scenario.capacitance, duration)
-    ue_energy = torch.where(offloading, sending, local)
+    ue_energy = torch.where(offloading, slot.ue_transmission_energy, local)
     edge_energy = energy.computation_energy(edge_load / duration, scenario.capacitance, duration)
-    transmitting = torch.where(
-        slot.relays,
-        energy.relay_energy(offloading, scenario.relay_power * power, duration),
-        energy.jamming_energy(scenario.jamming_power * power, duration),
-    )
-    flying = energy.flight_energy(slot.control.velocity, scenario.helper_mass, duration)
-    helper_energy = flying + transmitting
+    helper_energy = slot.flight_energy + slot.helper_transmission_energy
     violations = (
         (ue_energy > _rounded_up(scenario.ue_energy_budget)).sum(dim=-1, keepdim=True)
         + (edge_energy > _rounded_up(scenario.edge_energy_budget))
@@ -77,7 +66,7 @@ def diagnose(
     )
     return TensorDict(
         offloading=offloading,
-        secrecy_rate=slot.secrecy_rate * offloading,
+        secrecy_rate=slot.offloading_rate,
         relay_sum_rate=slot.relay.sum_rate.unsqueeze(-1),
         jamming_sum_rate=slot.jamming.sum_rate.unsqueeze(-1),
         ue_energy=ue_energy,

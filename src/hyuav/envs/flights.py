@@ -14,6 +14,7 @@ from torchrl.envs import TransformedEnv
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav.envs.rendering import FlightRecorder
+from hyuav.envs.rewards import sum_rate_of
 from hyuav.physics.scenario import Scenario
 
 Floats = NDArray[np.float32]
@@ -86,7 +87,7 @@ class Flights:
         state["action"] = _as_tensor("action", action, (shape,), self.env.device)
         flown = self.env.step(state)
         after = flown["next"]
-        sum_rate = after["reward"] + self.scenario.off_map_penalty * after["off_map"]
+        sum_rate = sum_rate_of(after, self.scenario.off_map_penalty)
         self._enter(self.env.step_mdp(flown))
         return _column(after["reward"]), _column(sum_rate), _column(after["truncated"])
 

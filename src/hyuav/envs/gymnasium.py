@@ -14,6 +14,8 @@ from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import Count, checked
 from hyuav.envs.arguments import as_seed
 from hyuav.envs.flights import RENDERING, Flags, Flights, Floats, accepted_options
+from hyuav.envs.reward import Reward, Source
+from hyuav.envs.rewards import SUM_RATE
 from hyuav.envs.transforms import make_env
 from hyuav.physics.scenario import Scenario
 
@@ -32,7 +34,8 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
 
     Action: (2,) float32 in [-1, 1], the velocity in units of v_max; clipped.
 
-    Reward: the secrecy sum-rate of the slot (eq. 6) less the off-map penalty, bps/Hz.
+    Reward: the secrecy sum-rate of the slot (eq. 6) less the off-map penalty, bps/Hz; or what
+    ``reward`` says, less the penalty.
 
     Truncation: after T slots. Termination: never.
 
@@ -40,7 +43,7 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
         - ``position`` (2,) float32, m.
         - ``mode``: 1 relay, 0 jamming.
         - ``off_map``: the last flight would have left the map and was turned back.
-        - ``secrecy_sum_rate``, bps/Hz: the reward before the penalty; 0 after a reset.
+        - ``secrecy_sum_rate``, bps/Hz, before the penalty; 0 after a reset.
 
     Reset options: ``position`` (2,) m, where to start instead of at ``helper_starts[0]``.
 
@@ -54,6 +57,7 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
         geofence: slow flights so that they end on the map.
         device: where to compute; observations are NumPy arrays on any device.
         render_mode: "rgb_array" for :meth:`render` to draw the map, or None.
+        reward: what a slot earns, as for :func:`hyuav.make_env`.
 
     Raises:
         InputError: (a ``ValueError``) an argument, action or reset option that is not accepted.
@@ -76,9 +80,19 @@ class SecureOffloadingGymEnv(gymnasium.Env[Floats, Floats]):
         geofence: bool = False,
         device: torch.device | str | None = None,
         render_mode: str | None = None,
+        reward: Reward | Source | str = SUM_RATE,
     ) -> None:
         seed = int(self.np_random.integers(2**63))
-        env = make_env(scenario, scheme, (), device, seed, clock=clock, geofence=geofence)
+        env = make_env(
+            scenario,
+            scheme,
+            (),
+            device,
+            seed,
+            clock=clock,
+            geofence=geofence,
+            reward=reward,
+        )
         self._flights = Flights(env, render_mode)
         self.observation_space, self.action_space = self._flights.spaces()
         self.render_mode = render_mode
@@ -131,6 +145,7 @@ class SecureOffloadingVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         geofence: slow flights so that they end on the map.
         device: where to compute.
         render_mode: "rgb_array" for :meth:`render` to draw each row's map, or None.
+        reward: what a slot earns, as for :func:`hyuav.make_env`.
 
     Raises:
         InputError: (a ``ValueError``) an argument, action or reset option that is not accepted.
@@ -148,10 +163,20 @@ class SecureOffloadingVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         geofence: bool = False,
         device: torch.device | str | None = None,
         render_mode: str | None = None,
+        reward: Reward | Source | str = SUM_RATE,
     ) -> None:
         num_envs = checked(Count, "num_envs", num_envs)
         seed = int(self.np_random.integers(2**63))
-        env = make_env(scenario, scheme, num_envs, device, seed, clock=clock, geofence=geofence)
+        env = make_env(
+            scenario,
+            scheme,
+            num_envs,
+            device,
+            seed,
+            clock=clock,
+            geofence=geofence,
+            reward=reward,
+        )
         self._flights = Flights(env, render_mode)
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = self._flights.spaces()

@@ -1,5 +1,6 @@
 """The helper's flight as a natively batched TorchRL environment."""
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,7 +10,7 @@ from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from hyuav._support.errors import InputError, rejection
+from hyuav._support.errors import InputError, rejection, require_choice
 from hyuav._support.parameters import checked
 from hyuav.envs.arguments import (
     as_batch_size,
@@ -22,6 +23,8 @@ from hyuav.envs.arguments import (
 )
 from hyuav.envs.diagnostics import diagnose, diagnostics_spec
 from hyuav.envs.draws import Draws
+from hyuav.envs.reward import ENTRIES, FUNCTION, Reward, Source
+from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import ModeRule
 from hyuav.physics.scenario import Scenario
@@ -46,6 +49,7 @@ class SecureOffloadingEnv(EnvBase):
           fading multiplied the path gains of all links, in the order that
           :class:`hyuav.physics.channel.LinkRow` gives them and ``unflatten`` names.
         - ``diagnostics``, only where asked for, see :mod:`hyuav.envs.diagnostics`.
+        - what ``entries`` names, and ``sum_rate`` (1,) where the reward is another.
 
     Action:
         - ``action`` (H, 2) float32 in [-1, 1]: the velocity in units of v_max. It is clipped, then
@@ -53,7 +57,7 @@ class SecureOffloadingEnv(EnvBase):
 
     Reward:
         - ``reward`` (1,) float32, bps/Hz: the secrecy sum-rate of the slot (eq. 6), before any
-          penalty.
+          penalty; or what ``reward`` says.
 
     Termination: never.
 
@@ -71,10 +75,14 @@ class SecureOffloadingEnv(EnvBase):
             numbers then depend on its own seed alone: rows of equal seeds are equally lucky.
         diagnostics: compute the ``diagnostics`` entry too.
         fading: give the ``fading`` entry too.
+        reward: what a slot earns, a function of its outcome, or the name of one; see
+            :class:`hyuav.Reward`. A transform is for :func:`hyuav.make_env`.
+        entries: names of :data:`hyuav.envs.reward.ENTRIES`, properties of the slot's outcome that
+            are given beside: a number for each slot (1,), helper (H,) or UE (U,).
 
     Raises:
-        InputError: (a ``ValueError``) an unknown preset, scheme or device, a negative seed,
-            scenarios that differ in more than positions.
+        InputError: (a ``ValueError``) an unknown preset, scheme, reward or device, a negative seed,
+            scenarios that differ in more than positions, a reward that gives other than numbers.
         InputTypeError: (also a ``TypeError``) an argument of the wrong type.
 
     Example:
@@ -92,6 +100,8 @@ class SecureOffloadingEnv(EnvBase):
         seed: int | list[int] | tuple[int, ...] | None = None,
         diagnostics: bool = False,
         fading: bool = False,
+        reward: Reward | Source | str = SUM_RATE,
+        entries: Sequence[str] = (),
     ) -> None:
         super().__init__(device=as_device(device), batch_size=as_batch_size(batch_size))
         self.scenarios = as_scenarios(scenario, self.batch_size)
@@ -99,6 +109,9 @@ class SecureOffloadingEnv(EnvBase):
         self.schemes = as_schemes(scheme, self.batch_size)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
+        self.reward = self._checked_reward(as_reward(reward))
+        beside = () if self.reward == DEFAULT else (SUM_RATE,)
+        self._entries = tuple(dict.fromkeys((*entries, *beside)))
         rules = ModeRule.of(self.schemes, self.device)
         self._mode_rule = ModeRule(
             *(self._per_row(torch.as_tensor(flags, device=self.device)) for flags in rules)
@@ -113,6 +126,16 @@ class SecureOffloadingEnv(EnvBase):
             self.draws = Draws(self.physics, self.batch_size, as_seeds(seed, self.batch_size))
         else:
             self.set_seed(as_seed(seed))
+
+    def _checked_reward(self, reward: Reward) -> Reward:
+        """A function, of which it is known now what it depends on."""
+        if reward == DEFAULT:
+            return reward
+        if reward.is_transform:
+            accepted = f"{FUNCTION} (a transform is for make_env)"
+            raise InputError(rejection("reward", reward.name, accepted))
+        depends_on = reward.dependence(self.scenario, self.device)
+        return dataclasses.replace(reward, depends_on=depends_on)
 
     def _layout(self) -> Nodes:
         """Where the nodes are before the first slot, in each row where the rows differ."""
@@ -161,6 +184,11 @@ class SecureOffloadingEnv(EnvBase):
         )
         if self.tells_fading:
             self.observation_spec["fading"] = numbers(self.physics.link_row.size)
+        shapes = {"slot": (1,), "helper": (num_helpers,), "ue": (self.scenario.num_ues,)}
+        for name in self._entries:
+            require_choice("entry", name, ENTRIES)
+            make = flags if name == "offloading" else numbers
+            self.observation_spec[name] = make(*shapes[ENTRIES[name]])
         if self.diagnostics:
             self.observation_spec["diagnostics"] = diagnostics_spec(batch, self.scenario, device)
         # What a step reads besides the action; a reset may be given it too.
@@ -211,7 +239,7 @@ class SecureOffloadingEnv(EnvBase):
         action = action.to(torch.float32)  # as specified, whatever is given
         velocity = self.physics.velocity(action, self._norm_limit)
         after, outcome, tasks = self._slot(position, velocity)
-        after["reward"] = reward = outcome.sum_rate
+        after["reward"] = reward = self.reward.of(outcome).to(outcome.sum_rate.dtype)
         after["done"] = torch.zeros_like(reward, dtype=torch.bool)
         after["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
         if self.diagnostics:
@@ -237,6 +265,8 @@ class SecureOffloadingEnv(EnvBase):
             batch_size=self.batch_size,
             device=self.device,
         )
+        for name in self._entries:
+            observed[name] = getattr(outcome, name)
         if self.tells_fading:
             observed["fading"] = self.observation_spec["fading"].one() if fading is None else fading
         return observed, outcome, tasks

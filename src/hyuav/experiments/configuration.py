@@ -36,11 +36,12 @@ from hyuav._support.errors import (
 )
 from hyuav._support.interruption import interrupted_by_sigterm
 from hyuav._support.parameters import Parameters, mapping, refuse_unknown, unknown_field
+from hyuav._support.registry import file_name
 from hyuav._support.start import loaded, program
 from hyuav.experiments.configuration_files import read_files_as_data
-from hyuav.experiments.own_algorithms import run_named, with_own
+from hyuav.experiments.own_code import Named, run_again, run_named, with_own
 from hyuav.experiments.usage import usage
-from hyuav.learning.registry import ALGORITHMS, file_name, run_own
+from hyuav.learning.registry import ALGORITHMS
 from hyuav.physics.scenario import PRESETS, Scenario
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
@@ -98,13 +99,12 @@ def recipe(
 
     def decorate(function: Callable[[Config, Path], None]) -> Callable[[], None]:
         composed = False
-        references: list[str] = []
+        own: list[Named] = []
 
         def run(config: DictConfig) -> None:
             nonlocal composed
             composed = True
-            for reference in references:  # which a launcher's worker has not run yet
-                run_own(reference)
+            run_again(own)  # a launcher's worker has not run it yet
             hint = "" if NOW in run_directory else ", and the same command goes on"
             with _job(hint) as directory:
                 function(_plain(config, names, groups, sections), directory)
@@ -113,7 +113,7 @@ def recipe(
         run.__module__ = "__main__"
 
         def command() -> None:
-            nonlocal composed, references
+            nonlocal composed, own
             composed = False
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             logging.getLogger("torchrl").setLevel(logging.WARNING)
@@ -125,7 +125,7 @@ def recipe(
                 return
             with _ending_in_one_line(lambda: composed):
                 loaded()  # from here on an interruption is answered
-                references = run_named(chosen="algorithm" in groups)
+                own = run_named(chosen="algorithm" in groups)
                 register(groups)
                 _refuse_overrides(node, groups)
                 read_files_as_data(groups)

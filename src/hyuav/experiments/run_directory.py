@@ -21,7 +21,7 @@ from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.metrics import read_metrics
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
-from hyuav.learning.registry import find
+from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.learning.weights import count_learners
@@ -115,7 +115,7 @@ def named_algorithm(values: object) -> tuple[str, AlgorithmParameters]:
     """An algorithm and its name, from its hyperparameters with a ``name``."""
     fields = mapping("algorithm", values)
     name = fields.pop("name", None)
-    return str(name), find(name).from_dict(fields)
+    return str(name), ALGORITHMS.find(name).from_dict(fields)
 
 
 class RunDirectory:

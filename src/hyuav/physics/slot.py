@@ -51,6 +51,8 @@ class SlotOutcome(NamedTuple):
     """(..., H) bool, which helpers relay; the others jam."""
     relay: ModeOutcome
     jamming: ModeOutcome
+    scenario: Scenario
+    """That is flown."""
 
     @property
     def sum_rate(self) -> Tensor:
@@ -68,6 +70,41 @@ class SlotOutcome(NamedTuple):
     def secrecy_rate(self) -> Tensor:
         """[R^d_u - R^e_u]^+ in the chosen mode: (..., U) bps/Hz."""
         return torch.where(self.relays, self.relay.secrecy_rate, self.jamming.secrecy_rate)
+
+    @property
+    def offloading_rate(self) -> Tensor:
+        """The secrecy rate of the UEs that offload, 0 for the others: (..., U) bps/Hz."""
+        return self.secrecy_rate * self.offloading
+
+    @property
+    def flight_energy(self) -> Tensor:
+        """What flying takes: (..., H) J."""
+        scenario = self.scenario
+        return energy.flight_energy(
+            self.control.velocity, scenario.helper_mass, scenario.slot_duration
+        )
+
+    @property
+    def helper_transmission_energy(self) -> Tensor:
+        """What relaying or jamming takes: (..., H) J."""
+        scenario, power = self.scenario, self.control.power
+        duration = scenario.slot_duration
+        return torch.where(
+            self.relays,
+            energy.relay_energy(self.offloading, scenario.relay_power * power, duration),
+            energy.jamming_energy(scenario.jamming_power * power, duration),
+        )
+
+    @property
+    def ue_transmission_energy(self) -> Tensor:
+        """What offloading takes the UEs that offload, 0 for the others: (..., U) J."""
+        scenario = self.scenario
+        of_mode = scenario.ue_power, scenario.slot_duration, scenario.num_ues
+        relaying, jamming = (
+            self.distances.new_full((), energy.offloading_energy(*of_mode, relay=relay))
+            for relay in (True, False)
+        )
+        return torch.where(self.relays, relaying, jamming) * self.offloading
 
 
 class StandingNodes(NamedTuple):
@@ -313,4 +350,13 @@ def slot(
     relay = physics.relay_outcome(geometry, gains, tasks, control.power)
     jamming = physics.jamming_outcome(geometry, gains, tasks, control.power)
     relays = offloading.chooses_relay(relay.sum_rate, jamming.sum_rate, control.mode_rule)
-    return SlotOutcome(nodes, control, moved.off_map, geometry.distances, relays, relay, jamming)
+    return SlotOutcome(
+        nodes,
+        control,
+        moved.off_map,
+        geometry.distances,
+        relays,
+        relay,
+        jamming,
+        physics.scenario,
+    )

@@ -22,13 +22,14 @@ from hyuav._support.parameters import (
     ZeroOrMore,
     parameter,
 )
+from hyuav._support.registry import is_reference
 from hyuav.experiments.comparison.ray import LOCAL
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.parameters import OFF
 from hyuav.learning.guide.robust import Robust
-from hyuav.learning.registry import ALGORITHMS, PEER, find, is_reference, names
+from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
@@ -103,9 +104,9 @@ class Compare(Parameters):
     def __post_init__(self) -> None:
         for index, name in enumerate(self.algorithm):
             if is_reference(name):
-                find(name)
+                ALGORITHMS.find(name)
             place = f"algorithm[{index}]" if len(self.algorithm) > 1 else "algorithm"
-            require_choice(place, name, [*names(), PEER])
+            require_choice(place, name, [*ALGORITHMS.names(), PEER])
         for name in ("algorithm", "without", "scenario", "scheme", "num_slots"):
             values = getattr(self, name)
             if len(set(values)) < len(values):

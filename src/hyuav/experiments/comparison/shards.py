@@ -13,6 +13,7 @@ from rich.console import Console
 
 from hyuav._support.errors import BusyError, Halted, InputError, rejection
 from hyuav._support.files import read_parquet, rename_durably, write_durably
+from hyuav._support.registry import file_name
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import training_episodes
 from hyuav.experiments.evaluation import EvaluationParameters, fly
@@ -22,7 +23,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LEARNED, OPTIMA
 from hyuav.experiments.tracking import LoggerParameters, in_group
 from hyuav.experiments.train import resume, train
-from hyuav.learning.registry import PEER, file_name
+from hyuav.learning.registry import PEER
 
 TABLES = RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
 

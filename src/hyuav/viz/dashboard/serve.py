@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import Count, Parameters, Text, ZeroOrMore, parameter
-from hyuav.experiments.own_algorithms import OwnAlgorithm
+from hyuav.experiments.own_code import OwnAlgorithm
 
 APP = Path(__file__).with_name("app.py")
 
