@@ -10,6 +10,7 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 
 from hyuav.envs.observation import ObservationLayout
+from hyuav.envs.rewards import DEFAULT, SUM_RATE
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters
 from hyuav.learning.weights import load_weights, select_learners
 from hyuav.physics.scenario import Scenario
@@ -19,8 +20,8 @@ class NoiseFreeReturn(NamedTuple):
     """What actors earn without noise, on average over the same episodes."""
 
     reward: Tensor
-    """(N,) bps/Hz, accumulated, with penalties; less what a guide knows to be chance, so that
-    flights are told apart that differ by less."""
+    """(N,) in the unit of the reward, accumulated, with penalties; less what a guide knows to be
+    chance, so that flights are told apart that differ by less."""
     sum_rate: Tensor
     """(N,) bps/Hz, the accumulated secrecy sum-rate alone."""
 
@@ -42,16 +43,19 @@ def fly_noise_free(
     """
     scenario, learners = env.base_env.scenario, env.batch_size[0]
     layout = ObservationLayout(scenario, clock=False)  # places stand first, clock or not
-    off_map, control_term = torch.zeros(2, learners, device=env.device)
+    off_map, control_term, told = torch.zeros(3, learners, device=env.device)
+    is_told = env.base_env.reward != DEFAULT
     state, positions = env.reset(), []
     for _ in range(scenario.num_slots):
         slot = env.step(algorithm.actor(state))
         control_term += algorithm.guide.control_term(slot).mean(dim=(1, 2))
         state = env.step_mdp(slot)
         off_map += state["off_map"].squeeze(-1).float().mean(dim=-1)
+        if is_told:
+            told += state[SUM_RATE].squeeze(-1).mean(dim=-1)
         positions.append(layout.position(state["observation"])[:, 0])
     reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
-    sum_rate = reward + scenario.off_map_penalty * off_map
+    sum_rate = told if is_told else reward + scenario.off_map_penalty * off_map
     earned = NoiseFreeReturn(reward - control_term / reward_scale, sum_rate)
     return earned, torch.stack(positions)
 

@@ -27,6 +27,8 @@ from hyuav._support.parameters import (
 )
 from hyuav._support.recording import COMPILATION_ERRORS, has_compiler
 from hyuav.envs.arguments import as_device
+from hyuav.envs.reward import Reward, Source
+from hyuav.envs.rewards import SUM_RATE, as_reward
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import require_entries, require_like
 from hyuav.learning.compile import FlownEpisode
@@ -106,9 +108,11 @@ class Training:
         algorithm: which one, with its hyperparameters.
         parameters: how long and on what to learn.
         device: of all tensors.
+        reward: what a slot earns, as for :func:`hyuav.make_env`.
 
     Raises:
-        InputError: an unknown device; later, where it must be compiled, no working compiler.
+        InputError: an unknown device, or a reward that is none or does not suit the algorithm;
+            later, where it must be compiled, no working compiler.
         InputTypeError: an argument of the wrong type.
     """
 
@@ -119,6 +123,7 @@ class Training:
         algorithm: AlgorithmParameters,
         parameters: TrainingParameters,
         device: torch.device | str | None = None,
+        reward: Reward | Source | str = SUM_RATE,
     ) -> None:
         of_learners = isinstance(learners, list | tuple) and all(
             isinstance(learner, Learner) for learner in learners
@@ -128,7 +133,7 @@ class Training:
         if not isinstance(algorithm, AlgorithmParameters):
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
         self.scenario, self.parameters = scenario, parameters
-        self.learners = tuple(learners)
+        self.learners, self.reward = tuple(learners), as_reward(reward)
         device = as_device(device)
         on_cpu = device.type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
@@ -149,6 +154,7 @@ class Training:
                 parameters.replay_size,
                 parameters.batch_size,
                 device,
+                self.reward,
             )
             for members in self._members
         ]
