@@ -98,9 +98,9 @@ def test_compiled_slots_are_the_eager_ones_up_to_rounding(
     after = tensors(other)
     assert all(torch.equal(before[key], after[key]) for key in before)  # recording does nothing
     for _ in range(9):  # beyond the end of the replay
-        reward, losses, _ = eager.fly()
-        other_reward, other_losses, _ = other.fly()
-        torch.testing.assert_close(other_reward, reward, rtol=1e-3, atol=1e-4)
+        earned, losses, _ = eager.fly()
+        other_earned, other_losses, _ = other.fly()
+        torch.testing.assert_close(other_earned, earned, rtol=1e-3, atol=1e-4)
         torch.testing.assert_close(other_losses, losses, rtol=1e-2, atol=1e-4)
         assert_agree(tensors(eager), tensors(other))
     assert (other.episode, other.updates) == (eager.episode, eager.updates)

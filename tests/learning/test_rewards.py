@@ -38,7 +38,7 @@ def test_what_is_learned_is_what_is_earned(reward: str) -> None:
     *_, last = trained.episodes()
     cohort = trained.cohorts[0]
     again = make_env(SCENARIO, "hybrid", 1, seed=[1], reward=reward)
-    earned = []
+    earned: list[torch.Tensor] = []
     for _ in range(4):
         state = again.reset()
         for _slot in range(5):
@@ -95,7 +95,8 @@ def test_flights_then_count_what_they_earned_less_what_was_chance() -> None:
     trained = training("proportional_fairness", "ddpg_robust", guide=WITHOUT)
     for _ in trained.episodes():
         pass
-    guide, stored = trained.cohorts[0].algorithm.guide, trained.cohorts[0].stored
+    guide: Any = trained.cohorts[0].algorithm.guide
+    stored = trained.cohorts[0].stored
     flown = stored[15:20]
     term = guide.control_term(flown.transpose(0, 1)).transpose(0, 1)
     assert term.abs().max() > 0.0
@@ -106,7 +107,8 @@ def test_flights_then_count_what_they_earned_less_what_was_chance() -> None:
 
 def test_where_the_place_is_all_that_counts_the_whole_guide_is_at_work() -> None:
     def served(slot: Any) -> torch.Tensor:
-        return slot.offloading.float().mean(dim=-1, keepdim=True)  # type: ignore[no-any-return]
+        found: torch.Tensor = slot.offloading.float().mean(dim=-1, keepdim=True)
+        return found
 
     trained = training(served, "ddpg_robust")
     assert isinstance(trained.cohorts[0], Cohort)

@@ -95,7 +95,7 @@ class Cohort:
         self._parameters, self._transitions = parameters, parameters.transitions
         seeds = [learner.seed for learner in learners]
         schemes = [learner.scheme for learner in learners]
-        self._options = {"reward": reward, **parameters.environment}
+        self._options: dict[str, Any] = {"reward": reward, **parameters.environment}
         self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, **self._options)
         parameters.require_suited(self.env.base_env.reward)
         # Line 1: actor mu, critic Q, their targets and the replay buffer B.

@@ -77,8 +77,19 @@ class Reach:
         self._squared_norm = offsets[:, None] ** 2 + offsets**2
         self._reachable = np.abs(offsets) <= columns[np.abs(offsets)][:, None]
 
+    @property
+    def displacements(self) -> NDArray[np.int64]:
+        """All that one slot of flight allows, in grid spacings: (D, 2)."""
+        return np.argwhere(self._reachable) - self._reachable.shape[0] // 2
+
     def best(self, values: Values) -> Values:
-        """The largest value within reach of each grid point: (X, Y)."""
+        """The largest value within reach of each grid point: (X, Y).
+
+        Args:
+            values: (X, Y), of arriving at each grid point; or (D, X, Y), by each displacement.
+        """
+        if values.ndim == 3:
+            return self._best_of_each(values)
         best = np.full_like(values, -np.inf)
         for half_widths in self.boxes:
             # A window cannot reach further than across the grid.
@@ -87,13 +98,30 @@ class Reach:
             np.maximum(best, maximum_filter(values, size, mode="nearest"), out=best)
         return best
 
+    def _best_of_each(self, values: Values) -> Values:
+        best = np.full(values.shape[1:], -np.inf)
+        for arriving, displacement in zip(values, self.displacements, strict=True):
+            moved = list(zip(displacement.tolist(), best.shape, strict=True))
+            here = tuple(slice(max(-move, 0), size - max(move, 0)) for move, size in moved)
+            there = tuple(slice(max(move, 0), size - max(-move, 0)) for move, size in moved)
+            np.maximum(best[here], arriving[there], out=best[here])
+        return best
+
     def argbest(self, values: Values, point: tuple[int, int]) -> tuple[int, int]:
         """The grid point with the largest value within reach of ``point``; of equals the nearest.
 
         Args:
-            values: (X, Y).
+            values: (X, Y) or (D, X, Y), as for :meth:`best`.
             point: row and column.
         """
+        if values.ndim == 3:
+            ends = self.displacements + point
+            inside = ((ends >= 0) & (ends < values.shape[1:])).all(axis=1)
+            worth = np.full(len(ends), -np.inf)
+            worth[inside] = values[inside, *ends[inside].T]
+            norms = np.square(self.displacements).sum(axis=1)
+            row, column = ends[np.where(worth == worth.max(), norms, np.inf).argmin()]
+            return int(row), int(column)
         span = self._reachable.shape[0] // 2
         low = [max(index - span, 0) for index in point]
         grid_window = tuple(
@@ -117,14 +145,15 @@ def values_to_go(reward: Values, reach: Reach, num_slots: int) -> list[Values]:
     has no clock, so the values of all horizons come out of one pass.
 
     Args:
-        reward: expected reward of a slot spent at each grid point, (X, Y) bps/Hz.
+        reward: expected reward of a slot spent at each grid point, (X, Y); or of one in which the
+            helper came there by each displacement, (D, X, Y).
         reach: of one slot.
         num_slots: T.
 
     Returns:
-        T arrays (X, Y) in bps/Hz.
+        T arrays (X, Y), in the unit of the reward.
     """
-    values = [np.zeros_like(reward)]
+    values = [np.zeros(reward.shape[-2:])]
     for _ in range(num_slots - 1):
         values.append(reach.best(reward + values[-1]))
     return values
@@ -136,7 +165,7 @@ def best_flight(
     """The best flight of ``num_slots`` slots from the start: (num_slots + 1, 1, 2) m, float64.
 
     Args:
-        reward: (X, Y) bps/Hz.
+        reward: (X, Y) or (D, X, Y).
         values: what :func:`values_to_go` gives, for at least ``num_slots`` slots.
         reach: of one slot.
         grid: of the positions.

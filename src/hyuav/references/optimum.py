@@ -4,10 +4,12 @@ Given the position, fading and tasks are independent from slot to slot and unkno
 action is taken. The best expected return is therefore a deterministic dynamic program over the
 position alone,
 
-    V_t(x) = max over x' within reach of x of [ E r(x') + V_{t+1}(x') ],
+    V_t(x) = max over x' within reach of x of [ E r(x, x') + V_{t+1}(x') ],
 
-with the reward r = max(C_1, C_0) for the hybrid helper, C_1 for relay only and C_0 for jamming
-only. Positions are taken from a grid, which makes V a lower bound to the continuous optimum.
+with the reward r = C of the mode that is taken, max(C_1, C_0) for the hybrid helper, C_1 for relay
+only and C_0 for jamming only; or with another reward of the slot, in the same modes. Most rewards
+depend on x' alone, where the slot is spent; one may depend on the velocity too. Positions are taken
+from a grid, which makes V a lower bound to the continuous optimum.
 """
 
 import dataclasses
@@ -26,6 +28,8 @@ from torch import Tensor
 from hyuav._support.errors import InputError, InputTypeError, rejection
 from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked
 from hyuav.envs.arguments import as_scenario, as_seed
+from hyuav.envs.reward import EPISODE, VELOCITY, Reward, Source
+from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.physics.offloading import MODE_RULES, ModeRuleName
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
@@ -34,6 +38,12 @@ from hyuav.references.rewards import estimate_return, reward_maps
 
 RESOLUTION = 1.0
 """Default grid spacing in metres: halving it moves no preset's value by 0.2 %."""
+
+COARSE_RESOLUTION = 2.0
+"""The same where a reward depends on the velocity, of which there are hundreds then."""
+
+DRAWS, FEW_DRAWS = 256, 64
+"""By default, of a slot's fading and tasks; fewer where a reward depends on the velocity."""
 
 MEMORY_LIMIT = 4 * 2**30
 """Bytes that the value tables may take."""
@@ -53,9 +63,10 @@ class Optimum:
     resolution: float
     """Spacing of the grid in metres."""
     value: float
-    """Expected undiscounted return of the flight in bps/Hz, from draws that did not choose it."""
+    """Expected undiscounted return of the flight in the unit of the reward, from draws that did not
+    choose it."""
     standard_error: float
-    """Of ``value`` in bps/Hz; 0 where no slot is random."""
+    """Of ``value``; 0 where no slot is random."""
     path: Tensor
     """(T + 1, H, 2) m, float64: where the helpers are before the first slot and in each slot."""
     modes: Tensor
@@ -63,7 +74,7 @@ class Optimum:
     power: Tensor
     """(T, H) W, float64: the nominal power of the mode."""
     upper_bound: float | None = None
-    """Of what any flight earns, in bps/Hz; None where none is computed."""
+    """Of what any flight earns; None where none is computed."""
 
 
 class FlightPolicy(TensorDictModuleBase):
@@ -104,30 +115,37 @@ def solve_optimum(
     scenario: Scenario | str,
     mode_rules: Sequence[str] = MODE_RULES,
     *,
-    resolution: float = RESOLUTION,
-    draws: int = 256,
+    resolution: float | None = None,
+    draws: int | None = None,
     evaluation_draws: int = 10_000,
     seed: int = 0,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
+    reward: Reward | Source | str = SUM_RATE,
 ) -> dict[str, Optimum]:
     """The best flight under each mode rule over the scenario's T slots.
 
     Args:
         scenario: node positions and parameters, or the name of a preset.
         mode_rules: who may choose the modes, of :data:`hyuav.physics.offloading.MODE_RULES`.
-        resolution: spacing of the grid in m; the helper's start is a grid point.
+        resolution: spacing of the grid in m; the helper's start is a grid point. None for
+            :data:`RESOLUTION`, or :data:`COARSE_RESOLUTION` where the reward depends on the
+            velocity.
         draws: of a slot's fading and tasks that the expected reward is averaged over, the same
-            at all positions. They choose the flight and nothing else.
+            at all positions. They choose the flight and nothing else. None for :data:`DRAWS`, or
+            :data:`FEW_DRAWS`.
         evaluation_draws: of whole episodes, from which the flight's value is estimated.
         seed: of all draws; not used where no slot is random.
         track: passes on the mode rules one by one, as what shows the progress does.
+        reward: what a slot earns, as for :func:`hyuav.make_env`; the mode is chosen by the secrecy
+            sum-rate whatever it is. There is no optimum of one that does not add up over slots.
 
     Returns:
         an :class:`Optimum` for each mode rule.
 
     Raises:
         InputError: (a ``ValueError``) an unknown preset or mode rule, a resolution that is not
-            above 0 or needs more than :data:`MEMORY_LIMIT`, fewer than two draws.
+            above 0 or needs more than :data:`MEMORY_LIMIT`, fewer than two draws, a reward of which
+            there is no optimum.
         InputTypeError: (also a ``TypeError``) an argument of the wrong type.
     """
     scenario = as_scenario(scenario)
@@ -140,6 +158,7 @@ def solve_optimum(
         evaluation_draws=evaluation_draws,
         seed=seed,
         track=track,
+        reward=reward,
     )
     return {mode_rule: optima[scenario.num_slots] for mode_rule, optima in found.items()}
 
@@ -149,11 +168,12 @@ def solve_horizons(
     horizons: Sequence[int],
     mode_rules: Sequence[str] = MODE_RULES,
     *,
-    resolution: float = RESOLUTION,
-    draws: int = 256,
+    resolution: float | None = None,
+    draws: int | None = None,
     evaluation_draws: int = 10_000,
     seed: int = 0,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
+    reward: Reward | Source | str = SUM_RATE,
 ) -> dict[str, dict[int, Optimum]]:
     """The best flight under each mode rule over each horizon, from one backward pass.
 
@@ -167,6 +187,7 @@ def solve_horizons(
         evaluation_draws: from which each flight's value is estimated.
         seed: of all draws.
         track: passes on the mode rules.
+        reward: what a slot earns.
 
     Returns:
         by mode rule and horizon.
@@ -178,32 +199,86 @@ def solve_horizons(
     mode_rules = checked(OneOrMore[ModeRuleName], "mode_rules", mode_rules)
     scenarios = _with_horizons(scenario, horizons)
     longest = max(scenarios)
-    draws = checked(_Draws, "draws", draws)
+    reward = as_reward(reward)
+    if (reason := why_no_optimum(reward, scenario)) is not None:
+        raise InputError(rejection("reward", reward.name, f"one that has an optimum ({reason})"))
+    by_flight = depends_on_velocity(reward, scenario)
+    draws = checked(_Draws, "draws", draws or (FEW_DRAWS if by_flight else DRAWS))
     evaluation_draws = checked(_Draws, "evaluation_draws", evaluation_draws)
-    require_resolution(resolution, scenario.map_side, longest)
+    resolution = usable_resolution(resolution, scenario, longest, reward)
     root = torch.Generator().manual_seed(as_seed(seed))
     map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root).tolist()
 
     physics = Physics(scenario, dtype=torch.float64)
     grid = grid_over_map(scenario, resolution)
-    maps = reward_maps(physics, grid.positions(), draws, torch.Generator().manual_seed(map_seed))
+
+    def expected(rules: Sequence[str], velocities: Tensor | None = None) -> Tensor:
+        drawn = torch.Generator().manual_seed(map_seed)
+        maps = reward_maps(physics, grid.positions(), draws, drawn, reward, velocities, rules)
+        if not maps.isfinite().all():
+            kind = "all over the map" + ("" if by_flight else ", whatever the velocity")
+            raise InputError(rejection("reward", reward.name, f"finite numbers {kind}"))
+        return maps.reshape(*maps.shape[:-1], *grid.shape)
+
+    maps = None if by_flight else dict(zip(MODE_RULES, expected(MODE_RULES), strict=True))
     optima: dict[str, dict[int, Optimum]] = {}
     for mode_rule in track(mode_rules):
-        reward = maps[MODE_RULES.index(mode_rule)].reshape(grid.shape).numpy()
         reach = _reach(physics, mode_rule, grid, resolution)
-        values = values_to_go(reward, reach, longest)
+        moves = torch.from_numpy(reach.displacements) * (resolution / scenario.slot_duration)
+        own = (expected([mode_rule], moves)[0] if maps is None else maps[mode_rule]).numpy()
+        values = values_to_go(own, reach, longest)
         optima[mode_rule] = {}
         for horizon, shorter in scenarios.items():
-            path = _flyable(best_flight(reward, values, reach, grid, horizon), physics, mode_rule)
+            path = _flyable(best_flight(own, values, reach, grid, horizon), physics, mode_rule)
             # The same episodes for every flight, so that differences between them stand out.
             generator = torch.Generator().manual_seed(evaluation_seed)
             value, error, modes = estimate_return(
-                physics, path, mode_rule, evaluation_draws, generator
+                physics, path, mode_rule, evaluation_draws, generator, reward
             )
             optima[mode_rule][horizon] = Optimum(
                 shorter, mode_rule, resolution, value, error, path, modes, _power(scenario, modes)
             )
     return optima
+
+
+def depends_on_velocity(reward: Reward, scenario: Scenario) -> bool:
+    """Whether a slot earns what depends on how the helper flew."""
+    return reward != DEFAULT and reward.dependence(scenario) == VELOCITY
+
+
+def why_no_optimum(reward: Reward, scenario: Scenario) -> str | None:
+    """One sentence on why there is no optimum of a reward; None where there is one.
+
+    Args:
+        reward: what a slot earns.
+        scenario: in which a function is tried.
+    """
+    if reward.is_transform:
+        return "no optimum: a transform need not add up over slots"
+    if reward != DEFAULT and reward.dependence(scenario) == EPISODE:
+        return "no optimum: it does not add up over slots"
+    return None
+
+
+def usable_resolution(
+    resolution: float | None, scenario: Scenario, num_slots: int, reward: Reward = DEFAULT
+) -> float:
+    """A grid spacing in m, the default where it is None, whose tables fit :data:`MEMORY_LIMIT`.
+
+    Raises:
+        InputError: it is not above 0, or too fine.
+        InputTypeError: it is not a number.
+    """
+    by_flight = depends_on_velocity(reward, scenario)
+    if resolution is None:
+        resolution = COARSE_RESOLUTION if by_flight else RESOLUTION
+    require_resolution(resolution, scenario.map_side, num_slots)
+    reached = 2 * scenario.max_speed * scenario.slot_duration / resolution + 1
+    points = scenario.map_side / resolution + 1
+    if by_flight and 8 * 3 * (reached * points) ** 2 > MEMORY_LIMIT:
+        accepted = "a number of metres for which each displacement has a table (within 4 GiB)"
+        raise InputError(rejection("resolution", resolution, accepted))
+    return resolution
 
 
 def _with_horizons(scenario: Scenario, horizons: Sequence[int]) -> dict[int, Scenario]:
