@@ -29,6 +29,7 @@ from hyuav._support.parameters import (
     parameter,
 )
 from hyuav._support.terminal import make_progress, print_line
+from hyuav.envs.rewards import REWARDS
 from hyuav.experiments.configuration import Config, recipe, section
 from hyuav.experiments.evaluation import (
     EVALUATION_FILE,
@@ -55,6 +56,8 @@ class Evaluate(Parameters):
     output: Text | None = parameter(None)
     algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
     """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
+    reward: Text | None = parameter(None)
+    """By which to evaluate, a name or FILE.py:NAME; the first run's own where it is None."""
     device: Text = parameter("cpu")
     threads: Threads = parameter(1)
 
@@ -81,9 +84,13 @@ def main(config: Config, _: Path) -> None:
     for run in runs[1:]:
         if run.configuration().scenario != first.scenario:
             raise InputError(rejection("run", str(run.path), f"the scenario of {runs[0].path}"))
+        if options.reward is None and run.configuration().reward != first.reward:
+            accepted = f"the reward of {runs[0].path}, or reward=NAME for all"
+            raise InputError(rejection("run", str(run.path), accepted))
     scenario = first.scenario
     if options.num_slots is not None:
         scenario = dataclasses.replace(scenario, num_slots=options.num_slots)
+    reward = first.reward if options.reward is None else REWARDS.find(options.reward)
     console = Console()
     output = runs[0].path if options.output is None else Path(options.output)
     learned = learned_policies(runs, scenario)
@@ -91,7 +98,8 @@ def main(config: Config, _: Path) -> None:
     for name in (EVALUATION_FILE, FLIGHTS_FILE):
         if (output / name).is_dir():
             raise InputError(rejection(name, str(output / name), "a file or none, not a directory"))
-    policies = {**learned, **reference_policies(scenario, parameters.resolution, console)}
+    references = reference_policies(scenario, parameters.resolution, console, reward)
+    policies = {**learned, **references}
     with make_progress(console, "evaluating") as progress:
         evaluation = evaluate(
             scenario,
@@ -100,6 +108,7 @@ def main(config: Config, _: Path) -> None:
             parameters,
             options.device,
             track=progress.track,
+            reward=reward,
         )
     evaluation.save(output)
     save_flight_map(scenario, evaluation.flights, output / "figures")

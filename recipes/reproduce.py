@@ -38,6 +38,7 @@ from hyuav._support.parameters import (
     parameter,
 )
 from hyuav._support.terminal import make_progress, print_line
+from hyuav.envs.rewards import SUM_RATE
 from hyuav.experiments.configuration import Config, recipe, same_call, section, telling_how_to_go_on
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, Policy, evaluate
 from hyuav.experiments.evaluation_table import print_results
@@ -52,7 +53,7 @@ from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.offloading import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Preset, Scenario
-from hyuav.references.optimum import require_resolution
+from hyuav.references.optimum import usable_resolution
 from hyuav.viz.data.runs import AS_IN_PAPER, horizon_directory
 from hyuav.viz.html.page import write_report
 from hyuav.viz.paper.gallery import FigureName, draw
@@ -77,6 +78,8 @@ class Reproduce(Parameters):
     """Of each scheme's initial weights, where it is trained as in the paper."""
     candidate_episodes: Count = parameter(50)
     seed: CountOrZero = parameter(0)
+    reward: Text = parameter(SUM_RATE)
+    """What a slot earns: a name, or FILE.py:NAME of a function or a transform."""
     device: Text = parameter("cpu")
     threads: Threads = parameter(1)
 
@@ -114,7 +117,7 @@ def reproduce(config: Config, directory: Path) -> None:
     scenario, console = own.scenario, work.console
     others = _other_horizons(scenario, options)
     longest = max([scenario.num_slots, *others])
-    require_resolution(work.evaluation.resolution, scenario.map_side, longest)
+    usable_resolution(work.evaluation.resolution, scenario, longest, own.reward)
     further = _on_further_presets(own, options)
 
     run = work.train(directory, _over_horizons(own, options, others))
@@ -181,15 +184,22 @@ class Work:
         beside: Mapping[str, list[Policy]] | None = None,
     ) -> Evaluation:
         """Fly a run's actors, what stands beside them and the references; keep what came of it."""
+        trained = run.configuration()
+        reward = trained.reward
         policies = {
             **learned_policies([run], scenario),
             **(beside or {}),
-            **reference_policies(scenario, self.evaluation.resolution, self.console),
+            **reference_policies(scenario, self.evaluation.resolution, self.console, reward),
         }
-        name = run.configuration().scenario_name
         with make_progress(self.console, "evaluating") as progress:
             evaluation = evaluate(
-                scenario, name, policies, self.evaluation, self.device, track=progress.track
+                scenario,
+                trained.scenario_name,
+                policies,
+                self.evaluation,
+                self.device,
+                track=progress.track,
+                reward=reward,
             )
         evaluation.save(directory)
         return evaluation
@@ -266,7 +276,7 @@ def _candidates(
     reached = ", ".join(f"{value:.1f}" for value in earned)
     console.print(
         f"as in the paper, initial weights from {options.candidates} candidates per scheme "
-        f"after {episodes} episodes: {reached} bps/Hz"
+        f"after {episodes} episodes: {reached} {configuration.reward.unit}"
     )
     return weights
 

@@ -86,10 +86,9 @@ class Reward:
         return issubclass(kind, Transform)
 
     @property
-    def label(self) -> str:
-        """Its name with its unit."""
-        name = self.name.rpartition(":")[2].replace("_", " ")
-        return f"{name} ({self.unit})" if self.unit else name
+    def in_brackets(self) -> str:
+        """The unit as it stands behind a word; empty where there is none."""
+        return f" ({self.unit})" if self.unit else ""
 
     def of(self, outcome: SlotOutcome) -> Tensor:
         """What slots (...) earn: (..., 1). A transform is asked nothing here."""

@@ -19,16 +19,10 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         f"{harmless(summary['scenario'])}, T = {summary['num_slots']}: mean of "
         f"{summary['episodes']} episodes on the same fading, 95 % interval"
     )
-    table = results_table(
-        title,
-        "Scheme",
-        "Secrecy sum-rate\n(bps/Hz)",
-        "own\noptimum",
-        "hybrid\noptimum",
-        "relay\nslots",
-        "UEs off-\nloading",
-        "off\nmap",
-    )
+    earned = earned_title(summary).replace(" (", "\n(")
+    beside = "sum-rate\n(bps/Hz)" if "reward" in summary else "hybrid\noptimum"
+    columns = "own\noptimum", beside, "relay\nslots", "UEs off-\nloading", "off\nmap"
+    table = results_table(title, "Scheme", earned, *columns)
     for scheme, result in summary["schemes"].items():
         table.add_row(LABELS[scheme], *flight_cells(result))
     print_table(table, console)
@@ -38,6 +32,15 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
             console.print(f"{LABELS[scheme]}: {count} energy budgets exceeded per episode")
 
 
+def earned_title(summary: Mapping[str, Any]) -> str:
+    """What is earned, with its unit: the secrecy sum-rate, or the reward of an evaluation."""
+    if "reward" not in summary:
+        return "Secrecy sum-rate (bps/Hz)"
+    name, unit = (harmless(str(summary["reward"][part])) for part in ("name", "unit"))
+    title = name.rpartition(":")[2].replace("_", " ").capitalize()
+    return f"{title} ({unit})" if unit else title
+
+
 def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
     """How a scheme flew, as text.
 
@@ -45,14 +48,16 @@ def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
         result: of the scheme, in the summary.
 
     Returns:
-        the secrecy sum-rate with its interval, the fractions of the scheme's own and of the hybrid
-        optimum, the shares of relay slots and of UEs offloading, and the slots off the map.
+        what it earned with its interval, the fraction of the scheme's own optimum, that of the
+        hybrid optimum or, where another reward was earned, the secrecy sum-rate, the shares of
+        relay slots and of UEs offloading, and the slots off the map.
     """
-    rate = result["secrecy_sum_rate"]
+    rate = result.get("reward", result["secrecy_sum_rate"])
+    hybrid = percent(result.get("fraction_of_hybrid_optimum"))
     return (
         interval(rate["mean"], *rate["ci95"]),
         percent(result.get("fraction_of_optimum")),
-        percent(result.get("fraction_of_hybrid_optimum")),
+        f"{result['secrecy_sum_rate']['mean']:.2f}" if "reward" in result else hybrid,
         percent(result["relay_share"]),
         percent(result["offloading_share"]),
         f"{result['off_map']:.1f}",

@@ -7,13 +7,15 @@ from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.terminal import make_progress, print_line
+from hyuav.envs.reward import Reward
+from hyuav.envs.rewards import DEFAULT
 from hyuav.experiments.evaluation import Policy
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.policy import LearnedPolicy
 from hyuav.physics.scenario import Scenario
-from hyuav.references.optimum import FlightPolicy, solve_optimum
+from hyuav.references.optimum import FlightPolicy, solve_optimum, why_no_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
 
@@ -83,20 +85,24 @@ def straight_policies(scenario: Scenario) -> tuple[dict[str, list[Policy]], list
 
 
 def reference_policies(
-    scenario: Scenario, resolution: float, console: Console
+    scenario: Scenario, resolution: float | None, console: Console, reward: Reward = DEFAULT
 ) -> dict[str, list[Policy]]:
-    """Re-LT, Ja-LT and the exact optimum of each mode rule.
+    """Re-LT, Ja-LT and the exact optimum of each mode rule, where there is one.
 
     Args:
         scenario: to fly.
-        resolution: of the optimum's grid in m.
-        console: for the straight flights that are left out, and for the progress.
+        resolution: of the optimum's grid in m; None for the default.
+        console: for what is left out, and for the progress.
+        reward: of which it is the optimum.
     """
     policies, left_out = straight_policies(scenario)
     for line in left_out:
         print_line(line, console)
+    if (reason := why_no_optimum(reward, scenario)) is not None:
+        print_line(f"reward = {reward.name}: {reason}", console)
+        return policies
     with make_progress(console, "optima") as progress:
-        optima = solve_optimum(scenario, resolution=resolution, track=progress.track)
+        optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [Policy(FlightPolicy(optimum.path, scenario))]
     return policies

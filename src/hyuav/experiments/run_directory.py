@@ -18,6 +18,8 @@ from hyuav._support.errors import BusyError, InputError, rejection
 from hyuav._support.files import create_durably, require_writable
 from hyuav._support.parameters import checked, mapping
 from hyuav._support.yaml_files import read_yaml
+from hyuav.envs.reward import Reward
+from hyuav.envs.rewards import DEFAULT, REWARDS, SUM_RATE
 from hyuav.experiments.metrics import read_metrics
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
@@ -43,6 +45,13 @@ class RunConfiguration:
     algorithm_name: str
     algorithm: AlgorithmParameters
     training: TrainingParameters
+    reward: Reward = DEFAULT
+    """What a slot earns, one that its name finds again."""
+
+    def __post_init__(self) -> None:
+        if REWARDS.get(self.reward.name) != self.reward:
+            accepted = "one of the package, of a package's entry point or of a file that is named"
+            raise InputError(rejection("reward", self.reward.name, accepted))
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "RunConfiguration":
@@ -63,6 +72,7 @@ class RunConfiguration:
             algorithm_name,
             algorithm,
             TrainingParameters.from_dict(mapping("training", values["training"])),
+            REWARDS.find(values.get("reward", SUM_RATE)),  # which older runs do not name
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -72,6 +82,7 @@ class RunConfiguration:
             "learners": [learner.to_dict() for learner in self.learners],
             "algorithm": {"name": self.algorithm_name, **self.algorithm.to_dict()},
             "training": self.training.to_dict(),
+            "reward": self.reward.name,
         }
 
     def new_training(self, device: str | None = None) -> Training:
@@ -80,7 +91,8 @@ class RunConfiguration:
         Raises:
             InputError: as :class:`hyuav.learning.training.Training`.
         """
-        return Training(self.scenario, self.learners, self.algorithm, self.training, device)
+        parameters = self.algorithm, self.training
+        return Training(self.scenario, self.learners, *parameters, device, self.reward)
 
 
 Learners = Annotated[tuple[Learner, ...], Field(min_length=1, description="a list of learners")]

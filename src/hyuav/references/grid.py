@@ -101,7 +101,9 @@ class Reach:
     def _best_of_each(self, values: Values) -> Values:
         best = np.full(values.shape[1:], -np.inf)
         for arriving, displacement in zip(values, self.displacements, strict=True):
-            moved = list(zip(displacement.tolist(), best.shape, strict=True))
+            shape: tuple[int, ...] = best.shape
+            moves: list[int] = displacement.tolist()
+            moved = list(zip(moves, shape, strict=True))
             here = tuple(slice(max(-move, 0), size - max(move, 0)) for move, size in moved)
             there = tuple(slice(max(move, 0), size - max(-move, 0)) for move, size in moved)
             np.maximum(best[here], arriving[there], out=best[here])

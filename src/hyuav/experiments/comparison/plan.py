@@ -23,6 +23,7 @@ from hyuav._support.parameters import (
     parameter,
 )
 from hyuav._support.registry import is_reference
+from hyuav.envs.rewards import REWARDS, SUM_RATE
 from hyuav.experiments.comparison.ray import LOCAL
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.learning.algorithm import AlgorithmParameters
@@ -85,6 +86,8 @@ class Compare(Parameters):
     learners: Annotated[int, Field(ge=1, le=100_000)] = parameter(10)
     """Of each algorithm, scenario, mode rule and horizon; their seeds follow ``seed``."""
     seed: CountOrZero = parameter(0)
+    reward: Text = parameter(SUM_RATE)
+    """What a slot earns: a name, or FILE.py:NAME of a function that adds up over slots."""
     threshold: Fraction = parameter(0.97)
     """Share of the optimum that counts as solved."""
     shard_learners: Count = parameter(60)
@@ -102,6 +105,7 @@ class Compare(Parameters):
     """Directory of the comparison, which may have been begun."""
 
     def __post_init__(self) -> None:
+        REWARDS.find(self.reward)
         for index, name in enumerate(self.algorithm):
             if is_reference(name):
                 ALGORITHMS.find(name)

@@ -3,7 +3,7 @@
 import copy
 import math
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import pandas as pd
@@ -17,7 +17,6 @@ from hyuav.experiments.evaluation import EvaluationParameters, Policy, fly
 from hyuav.experiments.run_directory import RunConfiguration
 from hyuav.experiments.schemes import LEARNED
 from hyuav.learning.train import Learner
-from hyuav.physics.scenario import Scenario
 
 
 class Actor(TensorDictModuleBase):
@@ -45,7 +44,7 @@ class Actor(TensorDictModuleBase):
 
 def train(
     configuration: RunConfiguration, evaluation: EvaluationParameters
-) -> tuple[pd.DataFrame, list[float]]:
+) -> tuple[pd.DataFrame, list[float], list[float]]:
     """Train the learners one after another, with the paper's hyperparameters.
 
     They are evaluated as this project's own are, after as many episodes and in the same ones.
@@ -55,20 +54,21 @@ def train(
         evaluation: of each learner's best weights.
 
     Returns:
-        a row for each evaluation and learner, as :meth:`.shards.Shard.tables` takes them, and what
-        each learner's best weights earn in bps/Hz.
+        a row for each evaluation and learner, as :meth:`.shards.Shard.tables` takes them, the
+        sum-rate of each learner's best weights in bps/Hz, and what they earn.
     """
-    rows, sum_rates = [], []
+    rows, sum_rates, earned = [], [], []
     for index, learner in enumerate(configuration.learners):
-        own, sum_rate = _train(configuration, learner, evaluation)
+        own, best = _train(configuration, learner, evaluation)
         rows += [{"learner": index, **row} for row in own]
-        sum_rates.append(sum_rate)
-    return pd.DataFrame(rows), sum_rates
+        sum_rates.append(best.sum_rate)
+        earned.append(best.earned)
+    return pd.DataFrame(rows), sum_rates, earned
 
 
 def _train(
     configuration: RunConfiguration, learner: Learner, evaluation: EvaluationParameters
-) -> tuple[list[dict[str, Any]], float]:
+) -> tuple[list[dict[str, Any]], "Brought"]:
     started, scenario, training = (
         time.perf_counter(),
         configuration.scenario,
@@ -78,6 +78,7 @@ def _train(
         "hyuav/SecureOffloading-v0",
         scenario=scenario,
         scheme=learner.scheme,
+        reward=configuration.reward,
         disable_env_checker=True,
     )
     model = ddpg_model(
@@ -96,27 +97,39 @@ def _train(
         slots = episodes * scenario.num_slots
         model.learn(slots, reset_num_timesteps=False, log_interval=None)
         episode += episodes
-        sum_rate, reward = _earned(scenario, learner.scheme, actor, training_episodes(training))
-        if reward > best:
-            best, best_weights = reward, copy.deepcopy(actor.state_dict())
+        brought = _flown(configuration, learner.scheme, actor, training_episodes(training))
+        if brought.reward > best:
+            best, best_weights = brought.reward, copy.deepcopy(actor.state_dict())
         rows.append(
             {
                 "episode": episode,
                 "slots": episode * scenario.num_slots,
                 "seconds": time.perf_counter() - started,
-                "evaluation": reward,
-                "sum_rate": sum_rate,
+                "evaluation": brought.reward,
+                "sum_rate": brought.sum_rate,
             }
         )
     actor.load_state_dict(best_weights)
-    return rows, _earned(scenario, learner.scheme, actor, evaluation)[0]
+    return rows, _flown(configuration, learner.scheme, actor, evaluation)
 
 
-def _earned(
-    scenario: Scenario, rule: str, actor: Actor, episodes: EvaluationParameters
-) -> tuple[float, float]:
-    """Means over the episodes in bps/Hz: the secrecy sum-rate, and the reward with penalties."""
-    totals = fly(scenario, LEARNED[rule], Policy(actor), episodes).totals
-    sum_rate = totals["secrecy_sum_rate"]
-    reward = sum_rate - scenario.off_map_penalty * totals["off_map"]
-    return float(sum_rate.mean()), float(reward.mean())
+class Brought(NamedTuple):
+    """Means over episodes."""
+
+    sum_rate: float
+    """bps/Hz."""
+    earned: float
+    """By the reward."""
+    reward: float
+    """The same with penalties."""
+
+
+def _flown(
+    configuration: RunConfiguration, rule: str, actor: Actor, episodes: EvaluationParameters
+) -> Brought:
+    """What an actor brings in these episodes."""
+    scenario, reward = configuration.scenario, configuration.reward
+    flights = fly(scenario, LEARNED[rule], Policy(actor), episodes, reward=reward)
+    penalized = flights.earned - scenario.off_map_penalty * flights.totals["off_map"]
+    means = flights.totals["secrecy_sum_rate"], flights.earned, penalized
+    return Brought(*(float(each.mean()) for each in means))
