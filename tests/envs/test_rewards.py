@@ -104,6 +104,19 @@ def test_a_function_and_a_transform_may_say_the_same() -> None:
     assert (function["next", "reward"] == transform["next", "reward"]).all()
 
 
+class Late(Served):
+    """Read what the other transforms keep."""
+
+    def _step(self, before: TensorDictBase, after: TensorDictBase) -> TensorDictBase:
+        after["reward"] = 1.0 * (before["step_count"] + 1)
+        return after
+
+
+def test_a_transform_may_read_what_the_others_keep() -> None:
+    after = flown(slots=4, reward=Late)["next"]
+    assert after["reward"][0].flatten().tolist() == [1.0, 2.0, 3.0, 4.0]
+
+
 def test_one_transform_serves_several_environments() -> None:
     doubled = RewardScaling(0.0, 2.0)
     several = [flown(reward=doubled)["next", "reward"] for _ in range(2)]

@@ -1,4 +1,4 @@
-"""A reward of one's own, named where it is used: FILE.py:NAME, or one that comes with the package."""
+"""A reward of one's own, named where it is used, or one that comes with the package."""
 
 import json
 import sys

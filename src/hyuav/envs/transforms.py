@@ -165,8 +165,9 @@ def _require_numbers(reward: Reward, scenario: Scenario, device: torch.device | 
         scenario, batch_size=3, device=device, seed=0, reward=below, entries=entries
     )
     hover = env.full_action_spec.zero()
+    around = RewardSum(), StepCounter()
     try:
-        flown = TransformedEnv(env, Compose(*changes), device=device)
+        flown = TransformedEnv(env, Compose(*changes, *around), device=device)
         earned = flown.step(flown.reset().update(hover))["next", "reward"]
     except Exception as error:  # whichever the transform raises
         accepted = f"a transform of TorchRL that works ({reward.told(error)})"

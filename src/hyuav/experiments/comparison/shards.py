@@ -216,9 +216,10 @@ class Shard:
             ``results``, a row for each learner: ``sum_rate``, what it ``earned``, the ``optimum``
             of its mode rule in the same episodes, and the ratio of both, ``fraction``;
             ``episodes_to_threshold`` and ``seconds_to_threshold`` at the first evaluation at which
-            the best weights so far earned the threshold's share of what the optimum earns in that evaluation's episodes,
-            NaN where none did; ``seconds`` in all; and ``stopped``, the episode in which the
-            learner stopped for want of finite numbers, NaN for those that did not.
+            the best weights so far earned the threshold's share of what the optimum earns in that
+            evaluation's episodes, NaN where none did; ``seconds`` in all; and ``stopped``, the
+            episode in which the learner stopped for want of finite numbers, NaN for those that did
+            not.
             ``curves``, a row for each evaluation, with ``best_sum_rate``, what the best weights so
             far earned, and its ``fraction`` of the optimum in the same episodes.
         """
