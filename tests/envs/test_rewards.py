@@ -1,7 +1,10 @@
 """What a slot earns is the researcher's: a function of its outcome, or a transform."""
 
+import dataclasses
 import pickle
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -219,6 +222,37 @@ def test_gymnasium_tells_the_sum_rate_beside_it(build: Callable[..., Any]) -> No
     assert earned[4]["secrecy_sum_rate"] == pytest.approx(told[4]["secrecy_sum_rate"])
     assert np.all(np.asarray(told[1]) <= 1.0)
     assert gymnasium.make("hyuav/SecureOffloading-v0", reward="proportional_fairness").reset()
+
+
+def test_fairness_begins_anew_where_gymnasium_starts_an_episode() -> None:
+    still = dataclasses.replace(TWO_CLUSTERS, fading=False, num_slots=6)
+    start = dataclasses.replace(still, helper_starts=((-40.0, 0.0),))
+    envs = gymnasium.make_vec(
+        "hyuav/SecureOffloading-v0", 2, scenario=start, reward="proportional_fairness"
+    )
+    envs.reset(seed=0)
+    hover = np.zeros((2, 2), np.float32)
+    earned = np.stack([envs.step(hover)[1] for _ in range(12)])
+    assert (earned > 0.0).all()
+    np.testing.assert_allclose(earned[:6], earned[6:])
+    assert (earned[0] > earned[1]).all()  # what a UE gets first counts most
+
+
+def test_an_installed_package_offers_its_reward_by_an_entry_point(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "kind_package.py").write_text("def kind(slot):\n    return slot.sum_rate + 1.0\n")
+    metadata = tmp_path / "kind_package-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Name: kind-package\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text("[hyuav.rewards]\nkind = kind_package:kind\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    try:
+        assert flown(slots=1, reward="kind")["next", "reward"].min() >= 1.0
+        assert as_reward("kind").name == "kind"
+    finally:
+        REWARDS.pop("kind", None)
+        sys.modules.pop("kind_package", None)
 
 
 @pytest.mark.parametrize("reward", [*REWARDS.values(), Reward(served, unit="share")])
