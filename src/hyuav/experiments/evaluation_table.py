@@ -1,6 +1,7 @@
 """What an evaluation found, as a table for the terminal."""
 
 from collections.abc import Mapping
+from textwrap import wrap
 from typing import Any
 
 from rich.console import Console
@@ -12,6 +13,10 @@ from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.schemes import LABELS
 
 
+WIDTH = 18
+"""Of the heading of what is earned."""
+
+
 def print_results(evaluation: Evaluation, console: Console) -> None:
     """Print the evaluation as a table that fits 80 columns."""
     summary = evaluation.summary
@@ -19,7 +24,7 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         f"{harmless(summary['scenario'])}, T = {summary['num_slots']}: mean of "
         f"{summary['episodes']} episodes on the same fading, 95 % interval"
     )
-    earned = earned_title(summary).replace(" (", "\n(")
+    earned = "\n".join(wrap(earned_title(summary), WIDTH, break_on_hyphens=False))
     beside = "sum-rate\n(bps/Hz)" if "reward" in summary else "hybrid\noptimum"
     columns = "own\noptimum", beside, "relay\nslots", "UEs off-\nloading", "off\nmap"
     table = results_table(title, "Scheme", earned, *columns)
@@ -53,9 +58,10 @@ def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
         relay slots and of UEs offloading, and the slots off the map.
     """
     rate = result.get("reward", result["secrecy_sum_rate"])
+    digits = 1 if "reward" in result and abs(rate["mean"]) >= 100.0 else 2
     hybrid = percent(result.get("fraction_of_hybrid_optimum"))
     return (
-        interval(rate["mean"], *rate["ci95"]),
+        interval(rate["mean"], *rate["ci95"], digits),
         percent(result.get("fraction_of_optimum")),
         f"{result['secrecy_sum_rate']['mean']:.2f}" if "reward" in result else hybrid,
         percent(result["relay_share"]),
