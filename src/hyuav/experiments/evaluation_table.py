@@ -12,7 +12,6 @@ from hyuav._support.terminal import print_table, results_table
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.schemes import LABELS
 
-
 WIDTH = 18
 """Of the heading of what is earned."""
 
@@ -61,7 +60,7 @@ def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
     digits = 1 if "reward" in result and abs(rate["mean"]) >= 100.0 else 2
     hybrid = percent(result.get("fraction_of_hybrid_optimum"))
     return (
-        interval(rate["mean"], *rate["ci95"], digits),
+        interval(rate["mean"], *rate["ci95"], digits=digits),
         percent(result.get("fraction_of_optimum")),
         f"{result['secrecy_sum_rate']['mean']:.2f}" if "reward" in result else hybrid,
         percent(result["relay_share"]),
