@@ -57,10 +57,11 @@ def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
         relay slots and of UEs offloading, and the slots off the map.
     """
     rate = result.get("reward", result["secrecy_sum_rate"])
-    digits = 1 if "reward" in result and abs(rate["mean"]) >= 100.0 else 2
+    mean, (low, high) = rate["mean"], rate["ci95"]
+    digits = 1 if "reward" in result and abs(mean) >= 100.0 else 2
     hybrid = percent(result.get("fraction_of_hybrid_optimum"))
     return (
-        interval(rate["mean"], *rate["ci95"], digits=digits),
+        interval(mean, low, high, digits),
         percent(result.get("fraction_of_optimum")),
         f"{result['secrecy_sum_rate']['mean']:.2f}" if "reward" in result else hybrid,
         percent(result["relay_share"]),
