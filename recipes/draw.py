@@ -19,7 +19,7 @@ from hyuav._support.files import require_writable
 from hyuav._support.parameters import OneOrMore, Parameters, Text, ZeroOrMore, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
-from hyuav.experiments.own_algorithms import OwnAlgorithm
+from hyuav.experiments.own_code import OwnAlgorithm, OwnReward
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.paper.gallery import FigureName, draw
 
@@ -31,6 +31,8 @@ class Draw(Parameters):
     run: Text | None = parameter(None)
     algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
     """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
+    reward: ZeroOrMore[OwnReward] = parameter(())
+    """Their own rewards, for the same reason."""
     figures: OneOrMore[FigureName] | None = parameter(None)
     """None for all that the run's files allow."""
 

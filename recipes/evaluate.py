@@ -31,6 +31,7 @@ from hyuav._support.parameters import (
     parameter,
 )
 from hyuav._support.terminal import make_progress, print_line
+from hyuav.envs.rewards import REWARDS
 from hyuav.experiments.configuration import Config, given, recipe, section
 from hyuav.experiments.elsewhere import AS_TRAINED, destination, runs_in
 from hyuav.experiments.evaluation import (
@@ -40,7 +41,7 @@ from hyuav.experiments.evaluation import (
     evaluate,
 )
 from hyuav.experiments.evaluation_table import print_results
-from hyuav.experiments.own_algorithms import OwnAlgorithm
+from hyuav.experiments.own_code import OwnAlgorithm
 from hyuav.experiments.policies import learned_policies, reference_policies
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
@@ -62,6 +63,8 @@ class Evaluate(Parameters):
     and for each other scenario."""
     algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
     """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
+    reward: Text | None = parameter(None)
+    """By which to evaluate, a name or FILE.py:NAME; the first run's own where it is None."""
     device: Text = parameter("cpu")
     threads: Threads = parameter(1)
 
@@ -84,6 +87,12 @@ def main(config: Config, _: Path) -> None:
     runs = [run for path in options.run for run in runs_in(path)]
     if len({os.path.realpath(run.path) for run in runs}) < len(runs):
         raise InputError(rejection("run", list(options.run), "different run directories"))
+    trained = [run.configuration().reward for run in runs]
+    for run, own in zip(runs, trained, strict=True):
+        if options.reward is None and own != trained[0]:
+            accepted = f"the reward of {runs[0].path}, or reward=NAME for all"
+            raise InputError(rejection("run", str(run.path), accepted))
+    reward = trained[0] if options.reward is None else REWARDS.find(options.reward)
     flown = destination(
         runs,
         config["scenario"],
@@ -100,7 +109,8 @@ def main(config: Config, _: Path) -> None:
     for name in (EVALUATION_FILE, FLIGHTS_FILE):
         if (output / name).is_dir():
             raise InputError(rejection(name, str(output / name), "a file or none, not a directory"))
-    policies = {**learned, **reference_policies(scenario, parameters.resolution, console)}
+    references = reference_policies(scenario, parameters.resolution, console, reward)
+    policies = {**learned, **references}
     with make_progress(console, "evaluating") as progress:
         evaluation = evaluate(
             scenario,
@@ -109,6 +119,7 @@ def main(config: Config, _: Path) -> None:
             parameters,
             options.device,
             track=progress.track,
+            reward=reward,
         )
     evaluation.save(output)
     save_flight_map(scenario, evaluation.flights, output / "figures")

@@ -18,7 +18,7 @@ from hyuav._support.errors import InputError
 from hyuav._support.parameters import OneOrMore, Parameters, Text, Threads, ZeroOrMore, parameter
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
-from hyuav.experiments.own_algorithms import OwnAlgorithm
+from hyuav.experiments.own_code import OwnAlgorithm, OwnReward
 from hyuav.viz.html.page import write_report
 
 
@@ -30,6 +30,8 @@ class Report(Parameters):
     """Directories of runs or comparisons, finished or not."""
     algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
     """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
+    reward: ZeroOrMore[OwnReward] = parameter(())
+    """Their own rewards, for the same reason."""
     threads: Threads = parameter(1)
 
 

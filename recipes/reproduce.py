@@ -38,6 +38,7 @@ from hyuav._support.parameters import (
     parameter,
 )
 from hyuav._support.terminal import make_progress, print_line
+from hyuav.envs.rewards import SUM_RATE
 from hyuav.experiments.command_line import same_call
 from hyuav.experiments.configuration import Config, recipe, section, telling_how_to_go_on
 from hyuav.experiments.elsewhere import horizon_directory
@@ -54,7 +55,7 @@ from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Preset, Scenario
-from hyuav.references.optimum import require_resolution
+from hyuav.references.optimum import usable_resolution
 from hyuav.viz.data.runs import AS_IN_PAPER
 from hyuav.viz.html.page import write_report
 from hyuav.viz.paper.gallery import FigureName, draw
@@ -79,6 +80,8 @@ class Reproduce(Parameters):
     """Of each scheme's initial weights, where it is trained as in the paper."""
     candidate_episodes: Count = parameter(50)
     seed: CountOrZero = parameter(0)
+    reward: Text = parameter(SUM_RATE)
+    """What a slot earns: a name, or FILE.py:NAME of a function or a transform."""
     device: Text = parameter("cpu")
     threads: Threads = parameter(1)
 
@@ -112,7 +115,7 @@ def reproduce(config: Config, directory: Path) -> None:
     scenario, console = own.scenario, work.console
     others = _other_horizons(scenario, options)
     longest = max([scenario.num_slots, *others])
-    require_resolution(work.evaluation.resolution, scenario.map_side, longest)
+    usable_resolution(work.evaluation.resolution, scenario, longest, own.reward)
     further = _on_further_presets(own, options)
 
     run = work.train(directory, _over_horizons(own, options, others))
@@ -179,15 +182,22 @@ class Work:
         beside: Policies | None = None,
     ) -> Evaluation:
         """Fly a run's actors, what stands beside them and the references; keep what came of it."""
+        trained = run.configuration()
+        reward = trained.reward
         policies = {
             **learned_policies([run], scenario),
             **(beside or {}),
-            **reference_policies(scenario, self.evaluation.resolution, self.console),
+            **reference_policies(scenario, self.evaluation.resolution, self.console, reward),
         }
-        name = run.configuration().scenario_name
         with make_progress(self.console, "evaluating") as progress:
             evaluation = evaluate(
-                scenario, name, policies, self.evaluation, self.device, track=progress.track
+                scenario,
+                trained.scenario_name,
+                policies,
+                self.evaluation,
+                self.device,
+                track=progress.track,
+                reward=reward,
             )
         evaluation.save(directory)
         return evaluation
@@ -264,7 +274,7 @@ def _candidates(
     reached = ", ".join(f"{value:.1f}" for value in earned)
     console.print(
         f"as in the paper, initial weights from {options.candidates} candidates per scheme "
-        f"after {episodes} episodes: {reached} bps/Hz"
+        f"after {episodes} episodes: {reached} {configuration.reward.unit}"
     )
     return weights
 

@@ -30,7 +30,9 @@ from hyuav._support.parameters import (
     mapping,
     parameter,
 )
+from hyuav._support.registry import is_reference
 from hyuav._support.terminal import print_line
+from hyuav.envs.rewards import SUM_RATE
 from hyuav.experiments.configuration import (
     Config,
     given,
@@ -44,7 +46,6 @@ from hyuav.experiments.quoting import override
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train_or_resume
-from hyuav.learning.registry import is_reference
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.modes import ModeRuleName
@@ -63,6 +64,8 @@ class Train(Parameters):
     learners: Annotated[int, Field(ge=1, le=100_000)] = parameter(1)
     """Of each scheme and horizon; their seeds follow ``seed``."""
     seed: CountOrZero = parameter(0)
+    reward: Text = parameter(SUM_RATE)
+    """What a slot earns: a name, or FILE.py:NAME of a function or a transform."""
     device: Text = parameter("cpu")
     threads: Threads = parameter(1)
     warm_start: Text | None = parameter(None)
@@ -117,7 +120,8 @@ def go_on(path: str, config: Config) -> None:
     Raises:
         InputError: there is none, or something was asked for that would change what is trained.
     """
-    named = {"algorithm"} if is_reference(config["algorithm"]["name"]) else set()
+    own = {"algorithm": config["algorithm"]["name"], "reward": config["reward"]}
+    named = {field for field, name in own.items() if is_reference(name)}
     for name in given() - {"resume", "device", "threads", EPISODES} - named:
         if name == "hydra.run.dir" or not name.startswith(("logger", "hydra.")):
             accepted = f"nothing beside it but device=, threads=, logger.NAME= and {EPISODES}="
@@ -127,8 +131,8 @@ def go_on(path: str, config: Config) -> None:
     kept = {"device", "threads", "logger"} & asked.keys() - given()
     begun = {**config, **{name: asked[name] for name in kept}}
     options = section({**begun, "resume": path}, Train)
-    own = {name: value for name, value in config["logger"].items() if f"logger.{name}" in given()}
-    logger = LoggerParameters.from_dict({**mapping("logger", begun["logger"]), **own})
+    changed = {name: own for name, own in config["logger"].items() if f"logger.{name}" in given()}
+    logger = LoggerParameters.from_dict({**mapping("logger", begun["logger"]), **changed})
     torch.set_num_threads(options.threads)
     console = Console()
     episodes = config["training"]["num_episodes"] if EPISODES in given() else None
@@ -142,7 +146,8 @@ def tell(run: RunDirectory, console: Console) -> None:
     """Print what a run's learners have reached, and where it is."""
     best = run.metrics().groupby("learner")["best_evaluation"].last()
     returns = ", ".join(f"{value:.2f}" for value in best)
-    print_line(f"best noise-free accumulated reward (bps/Hz): {returns}", console)
+    unit = run.configuration().reward.in_brackets
+    print_line(f"best noise-free accumulated reward{unit}: {returns}", console)
     print_line(f"run: {run.path}", console)
     print_line(f"its report: {write_report(run.path).name}", console)
 

@@ -25,6 +25,8 @@ SHORT = TrainingParameters(
     [
         {"seed": 0, "diagnostics": True},
         {"seed": [1, 2, 3, 4], "fading": True, "clock": True, "geofence": True},
+        {"seed": 0, "reward": "secrecy_energy_efficiency"},
+        {"seed": 0, "reward": "proportional_fairness"},
     ],
 )
 def test_an_environment_keeps_to_its_device(options: dict[str, Any]) -> None:
@@ -34,6 +36,16 @@ def test_an_environment_keeps_to_its_device(options: dict[str, Any]) -> None:
         state["action"] = torch.zeros(4, 2, device="cpu")
         after = env.step(state)["next"]
     assert all(values.device.type == "cpu" for values in after.values(True, True))
+
+
+def test_a_training_for_another_objective_keeps_to_its_device() -> None:
+    algorithm = ALGORITHMS["ddpg"](hidden_sizes=(8,))
+    with torch.device("meta"):
+        training = Training(
+            SCENARIO, LEARNERS, algorithm, SHORT, "cpu", reward="proportional_fairness"
+        )
+        *_, last = training.episodes()
+    assert last.accumulated_reward.isfinite().all()
 
 
 @pytest.mark.parametrize("name", list(ALGORITHMS))

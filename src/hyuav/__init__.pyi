@@ -6,6 +6,7 @@ All that is not listed here may change at any time.
 from hyuav._support.errors import InputError as InputError
 from hyuav._support.errors import InputTypeError as InputTypeError
 from hyuav._support.errors import ScenarioWarning as ScenarioWarning
+from hyuav.envs.reward import Reward as Reward
 from hyuav.envs.secure_offloading import SecureOffloadingEnv as SecureOffloadingEnv
 from hyuav.envs.transforms import make_env as make_env
 from hyuav.experiments.comparison.plan import Compare as Compare

@@ -60,6 +60,20 @@ def assert_equal_up_to_rounding(eager: TensorDictBase, fast: TensorDictBase) -> 
 
 
 @COMPILES
+@pytest.mark.parametrize(
+    "reward",
+    [
+        "proportional_fairness",
+        pytest.param("secrecy_energy_efficiency", marks=pytest.mark.slow),
+    ],
+)
+def test_compiled_slots_earn_what_was_asked_for(reward: str) -> None:
+    eager, fast = both_flights(TWO_CLUSTERS, batch_size=40, seed=1, reward=reward)
+    assert fast["reward"].max() > 0.0
+    assert_equal_up_to_rounding(eager, fast)
+
+
+@COMPILES
 def test_compiled_slots_are_those_of_the_eager_environment() -> None:
     eager, fast = both_flights(TWO_CLUSTERS, batch_size=300, seed=1, clock=True)
     assert eager["off_map"].any()

@@ -8,7 +8,7 @@ from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.evaluation_table import print_results
 
 
-def printed(name: str = "square", **more: Any) -> list[str]:
+def printed(name: str = "square", reward: dict[str, str] | None = None, **more: Any) -> list[str]:
     result = {
         "secrecy_sum_rate": {"mean": 59.824, "ci95": [59.661, 59.984]},
         "fraction_of_hybrid_optimum": 0.9994,
@@ -19,6 +19,9 @@ def printed(name: str = "square", **more: Any) -> list[str]:
     }
     schemes = {"proposed": result | more}
     summary = {"scenario": name, "num_slots": 20, "episodes": 1000, "schemes": schemes}
+    if reward is not None:
+        schemes["proposed"]["reward"] = {"mean": 1390.85, "ci95": [1389.1, 1392.6]}
+        summary["reward"] = reward
     file = io.StringIO()
     print_results(Evaluation(summary, pd.DataFrame()), Console(file=file, width=80))
     return file.getvalue().splitlines()
@@ -31,6 +34,18 @@ def test_a_scheme_is_a_row_with_its_interval_within_80_columns() -> None:
         *("Proposed", "59.82", "[59.66,", "59.98]", "-"),
         *("99.9", "%", "11.8", "%", "79.0", "%", "12.0"),
     ]
+    assert max(map(len, lines)) <= 80
+
+
+def test_another_reward_stands_before_the_sum_rate_within_80_columns() -> None:
+    told = {"name": "secrecy_energy_efficiency", "unit": "bit/Hz/J"}
+    lines = printed(reward=told, fraction_of_optimum=0.98)
+    row = next(line for line in lines if line.lstrip().startswith("Proposed"))
+    assert row.split() == [
+        *("Proposed", "1390.8", "[1389.1,", "1392.6]", "98.0", "%", "59.82"),
+        *("11.8", "%", "79.0", "%", "12.0"),
+    ]
+    assert {"(bit/Hz/J)", "(bps/Hz)"} <= {word for line in lines for word in line.split()}
     assert max(map(len, lines)) <= 80
 
 

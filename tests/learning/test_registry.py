@@ -16,7 +16,7 @@ from hyuav._support.parameters import NonNegativeNumber, parameter
 from hyuav.experiments.run_directory import named_algorithm
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.registry import ALGORITHMS, find, run_own
+from hyuav.learning.registry import ALGORITHMS
 
 OWN = """
 from hyuav import DDPG
@@ -86,11 +86,11 @@ def written(directory: Path, program: str = OWN, name: str = "own.py") -> str:
 def test_a_class_of_a_file_is_found_by_a_name_once_the_file_was_named(tmp_path: Path) -> None:
     reference = written(tmp_path)
     with pytest.raises(InputError, match=r"^algorithm = 'own.py:Own': expected .* you name"):
-        find("own.py:Own")
-    assert run_own(reference) == "own.py:Own"
+        ALGORITHMS.find("own.py:Own")
+    assert ALGORITHMS.run_own(reference) == "own.py:Own"
     name, algorithm = named_algorithm({"name": "own.py:Own", "boldness": 3})
     assert (name, algorithm.to_dict()["boldness"]) == ("own.py:Own", 3.0)
-    assert run_own(reference) == "own.py:Own"
+    assert ALGORITHMS.run_own(reference) == "own.py:Own"
 
 
 def test_what_a_run_names_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,7 +102,7 @@ def test_what_a_run_names_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_parameters_of_a_file_reach_a_process_that_has_not_run_it(tmp_path: Path) -> None:
-    name = run_own(written(tmp_path))
+    name = ALGORITHMS.run_own(written(tmp_path))
     sent = pickle.dumps((ALGORITHMS[name](boldness=5.0), name))  # type: ignore[call-arg]
     received = subprocess.run(
         [
@@ -110,8 +110,8 @@ def test_parameters_of_a_file_reach_a_process_that_has_not_run_it(tmp_path: Path
             "-c",
             "import pickle, sys\n"
             "own, name = pickle.load(sys.stdin.buffer)\n"
-            "from hyuav.learning.registry import find\n"
-            "print(own.boldness, find(name) is type(own))",
+            "from hyuav.learning.registry import ALGORITHMS\n"
+            "print(own.boldness, ALGORITHMS.find(name) is type(own))",
         ],
         input=sent,
         capture_output=True,
@@ -122,9 +122,9 @@ def test_parameters_of_a_file_reach_a_process_that_has_not_run_it(tmp_path: Path
 
 
 def test_files_of_one_name_are_not_taken_for_each_other(tmp_path: Path) -> None:
-    run_own(written(tmp_path / "a"))
+    ALGORITHMS.run_own(written(tmp_path / "a"))
     with pytest.raises(InputError, match=r"expected files of different names"):
-        run_own(written(tmp_path / "b"))
+        ALGORITHMS.run_own(written(tmp_path / "b"))
 
 
 @pytest.mark.parametrize("name", ["missing.py", "directory.py", "text.txt", "a-b.py", ""])
@@ -133,14 +133,14 @@ def test_what_is_no_python_file_is_refused(tmp_path: Path, name: str) -> None:
     for other in ("text.txt", "a-b.py"):
         (tmp_path / other).write_text(OWN)
     with pytest.raises(InputError, match=r"^algorithm = .*: expected a Python file$"):
-        run_own(f"{tmp_path / name}:Own")
+        ALGORITHMS.run_own(f"{tmp_path / name}:Own")
 
 
 @pytest.mark.parametrize("kind", ["Missing", "parameter", "Count", ""])
 def test_what_is_no_algorithm_of_a_file_is_refused(tmp_path: Path, kind: str) -> None:
     written(tmp_path, OWN.replace("import NonN", "import Count, NonN"))
     with pytest.raises(InputTypeError, match="subclass of AlgorithmParameters"):
-        run_own(f"{tmp_path / 'own.py'}:{kind}")
+        ALGORITHMS.run_own(f"{tmp_path / 'own.py'}:{kind}")
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_file_that_fails_is_named_with_the_line_and_the_reason(
     reference = written(tmp_path / ("a" * 90), program)  # too long a path to be shown whole
     line = rf"^algorithm = '[^\n]*...: expected a Python file that runs \({reason}[^\n]*\)$"
     with pytest.raises(InputError, match=line):
-        run_own(reference)
+        ALGORITHMS.run_own(reference)
     assert "hyuav_own_own" not in sys.modules
 
 
@@ -183,6 +183,6 @@ def test_an_installed_package_offers_its_algorithm_by_an_entry_point(installed: 
     name, algorithm = named_algorithm({"name": installed, "boldness": 3})
     assert (name, algorithm.to_dict()["boldness"]) == ("bold", 3.0)
     with pytest.raises(InputError, match=r"^algorithm = 'broken': expected a package that loads"):
-        find("broken")
+        ALGORITHMS.find("broken")
     with pytest.raises(InputError, match=r"did you mean 'bold'\?"):
-        find("bolt")
+        ALGORITHMS.find("bolt")

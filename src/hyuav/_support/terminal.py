@@ -133,12 +133,15 @@ class TrainingProgress:
         console: to show it on.
         episodes: of the training.
         flown: before it began.
+        unit: of what it returns.
     """
 
-    def __init__(self, console: Console, episodes: int, flown: int = 0) -> None:
-        self._progress = make_progress(
-            console, "training", TextColumn("{task.fields[returns]} bps/Hz")
-        )
+    def __init__(
+        self, console: Console, episodes: int, flown: int = 0, unit: str = "bps/Hz"
+    ) -> None:
+        # Columns are formats: whatever a unit holds is shown as it is.
+        told = f"{{task.fields[returns]}} {unit.replace('{', '{{').replace('}', '}}')}".rstrip()
+        self._progress = make_progress(console, "training", TextColumn(told, markup=False))
         self._task = self._progress.add_task(
             "training", total=episodes, completed=flown, returns="-"
         )
@@ -151,7 +154,7 @@ class TrainingProgress:
         self._progress.stop()
 
     def update(self, episode: int, returns: Sequence[float]) -> None:
-        """Show the episode and what it returned to each learner, in bps/Hz."""
+        """Show the episode and what it returned to each learner."""
         shown = " ".join(f"{value:.1f}" for value in returns)
         if len(returns) > RETURNS_SHOWN:
             shown = f"mean {sum(returns) / len(returns):.1f}"

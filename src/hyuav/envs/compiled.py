@@ -12,7 +12,7 @@ from torch.fx.experimental.proxy_tensor import make_fx
 from torchrl.envs import TransformedEnv
 
 from hyuav._support.recording import COMPILATION_ERRORS, compile_graph, has_compiler
-from hyuav.envs.arguments import require_shape
+from hyuav.envs.arguments import NODES, require_shape
 from hyuav.envs.draws import GivenDraws
 
 Flight = Callable[..., tuple[Tensor, ...]]
@@ -44,7 +44,7 @@ class CompiledEnv(TransformedEnv):
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         partly = tensordict is not None and tensordict.get("_reset", None) is not None
-        if self._flight is None or partly:
+        if self._flight is None or partly or self._own_state:
             return super()._reset(tensordict, **kwargs)
         # What is found at the start is what a slot brings in which the helper stays there.
         before = self.full_state_spec.zero()
@@ -76,8 +76,14 @@ class CompiledEnv(TransformedEnv):
         return self._entries(self._output_keys, outputs)
 
     @property
+    def _own_state(self) -> list[Any]:
+        """What a reward that is a transform keeps from slot to slot; its reset is its own."""
+        known = "position", "episode_reward", "step_count", ("diagnostics", "edge_load"), *NODES
+        return [key for key in self.full_state_spec.keys(True, True) if key not in known]
+
+    @property
     def _input_keys(self) -> list[Any]:
-        keys: list[Any] = ["position", "action", "episode_reward", "step_count"]
+        keys: list[Any] = ["position", "action", "episode_reward", "step_count", *self._own_state]
         keys += self.base_env.node_entries(self.base_env.physics.nodes)
         return [*keys, ("diagnostics", "edge_load")] if self.base_env.diagnostics else keys
 

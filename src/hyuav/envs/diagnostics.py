@@ -55,25 +55,11 @@ def diagnose(
         edge_load: (..., 1) cycles that the edge server took in the previous slot.
     """
     cpu_cycles, offloading = tasks.cpu_cycles, slot.offloading
-    duration, num_ues = scenario.slot_duration, scenario.num_ues
-    relays, way = slot.relays, slot.way
-    relayed, straight = (
-        energy.offloading_energy(scenario.ue_power, duration, num_ues, relay=relay)
-        for relay in (True, False)
-    )
-    sending = torch.full_like(cpu_cycles, straight).masked_fill(way > 0, relayed)
+    duration = scenario.slot_duration
     local = energy.computation_energy(cpu_cycles / duration, scenario.capacitance, duration)
-    ue_energy = torch.where(offloading, sending, local)
+    ue_energy = torch.where(offloading, slot.ue_transmission_energy, local)
     edge_energy = energy.computation_energy(edge_load / duration, scenario.capacitance, duration)
-    helpers = torch.arange(1, scenario.num_helpers + 1, device=way.device)
-    through = ((way * offloading).unsqueeze(-1) == helpers).sum(dim=-2).to(edge_load.dtype)
-    relaying = energy.relay_energy(through, scenario.relay_power, duration / num_ues)
-    jamming = energy.jamming_energy(scenario.jamming_power, duration)
-    transmitting = torch.where(relays, relaying, torch.full_like(relaying, jamming))
-    if slot.control.power is not None:
-        transmitting = transmitting * slot.control.power
-    flying = energy.flight_energy(slot.control.velocity, scenario.helper_mass, duration)
-    helper_energy = flying + transmitting
+    helper_energy = slot.flight_energy + slot.helper_transmission_energy
     violations = (
         (ue_energy > _rounded_up(scenario.ue_energy_budget)).sum(dim=-1, keepdim=True)
         + (edge_energy > _rounded_up(scenario.edge_energy_budget))
@@ -81,7 +67,7 @@ def diagnose(
     )
     return TensorDict(
         offloading=offloading,
-        secrecy_rate=slot.secrecy_rate * offloading,
+        secrecy_rate=slot.offloading_rate,
         relay_sum_rate=slot.relay.sum_rate.unsqueeze(-1),
         jamming_sum_rate=slot.jamming.sum_rate.unsqueeze(-1),
         ue_energy=ue_energy,
@@ -89,7 +75,7 @@ def diagnose(
         edge_energy=edge_energy,
         helper_energy=helper_energy,
         budget_violation=violations,
-        batch_size=relays.shape[:-1],
+        batch_size=slot.relays.shape[:-1],
         device=edge_load.device,
     )
 

@@ -21,6 +21,7 @@ from torchrl.envs import TransformedEnv
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.parameters import Count, checked, plain
 from hyuav.envs.recorder import FlightRecorder
+from hyuav.envs.rewards import sum_rate_of
 from hyuav.physics.generators import LayoutGenerator, over_horizon
 from hyuav.physics.scenario import Scenario, as_scenario, is_layout
 
@@ -102,12 +103,9 @@ class Flights:
         state["action"] = _as_tensor("action", action, (shape,), self.env.device)
         flown = self.env.step(state)
         after = flown["next"]
-        reward = after["reward"]
-        sum_rate = reward + self.scenario.off_map_penalty * after["off_map"].sum(
-            dim=-1, keepdim=True
-        )
+        sum_rate = sum_rate_of(after, self.scenario.off_map_penalty)
         self._state = self.env.step_mdp(flown)
-        return _column(reward), _column(sum_rate), _column(after["truncated"])
+        return _column(after["reward"]), _column(sum_rate), _column(after["truncated"])
 
     def observation(self) -> Floats:
         """The normalized observation: (*B, observed)."""

@@ -45,7 +45,8 @@ class SecureOffloadingGymEnv(Limited, gymnasium.Env[Floats, Floats]):
 
     Action: (2,) float32 in [-1, 1], the velocity in units of v_max; clipped.
 
-    Reward: the secrecy sum-rate of the slot (eq. 6) less the off-map penalty, bps/Hz.
+    Reward: the secrecy sum-rate of the slot (eq. 6) less the off-map penalty, bps/Hz; or what
+    ``reward`` says, less the penalty.
 
     Truncation: after T slots, ``spec.max_episode_steps``. Termination: never.
 
@@ -53,7 +54,7 @@ class SecureOffloadingGymEnv(Limited, gymnasium.Env[Floats, Floats]):
         - ``position`` (2,) float32, m.
         - ``mode``: 1 relay, 0 jamming.
         - ``off_map``: the last flight would have left the map and was turned back.
-        - ``secrecy_sum_rate``, bps/Hz: the reward before the penalty; 0 after a reset.
+        - ``secrecy_sum_rate``, bps/Hz, before the penalty; 0 after a reset.
         - ``diagnostics`` with the entries of :mod:`hyuav.envs.diagnostics` and ``fading`` as in
           :class:`hyuav.SecureOffloadingEnv`, arrays, only where asked for.
 

@@ -12,7 +12,7 @@ from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from hyuav._support.errors import InputError, InputTypeError, rejection
+from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.parameters import checked, plain
 from hyuav.envs.arguments import (
     NODES,
@@ -27,6 +27,8 @@ from hyuav.envs.arguments import (
 from hyuav.envs.diagnostics import diagnose, diagnostics_spec
 from hyuav.envs.draws import Draws
 from hyuav.envs.recorder import FlightRecorder
+from hyuav.envs.reward import ENTRIES, FUNCTION, Reward, Source
+from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import ModeRule
@@ -54,6 +56,7 @@ class SecureOffloadingEnv(EnvBase):
         - ``ue_positions`` (U, 2), ``legitimate_position`` (2,) and ``eavesdropper_positions``
           (E, 2) float32, m, only where layouts are drawn: of the episode.
         - ``diagnostics``, only where asked for, see :mod:`hyuav.envs.diagnostics`.
+        - what ``entries`` names, and ``sum_rate`` (1,) where the reward is another.
 
     Action:
         - ``action`` (H, 2) float32 in [-1, 1]: the velocity in units of v_max. It is clipped, then
@@ -62,7 +65,7 @@ class SecureOffloadingEnv(EnvBase):
 
     Reward:
         - ``reward`` (1,) float32, bps/Hz: the secrecy sum-rate of the slot (eq. 6), before any
-          penalty.
+          penalty; or what ``reward`` says.
 
     Termination: never.
 
@@ -85,10 +88,14 @@ class SecureOffloadingEnv(EnvBase):
             equally lucky.
         diagnostics: compute the ``diagnostics`` entry too.
         fading: give the ``fading`` entry too.
+        reward: what a slot earns, a function of its outcome, or the name of one; see
+            :class:`hyuav.Reward`. A transform is for :func:`hyuav.make_env`.
+        entries: names of :data:`hyuav.envs.reward.ENTRIES`, properties of the slot's outcome that
+            are given beside: a number for each slot (1,), helper (H,) or UE (U,).
 
     Raises:
-        InputError: (a ``ValueError``) an unknown preset, scheme or device, a negative seed,
-            scenarios that differ in more than positions.
+        InputError: (a ``ValueError``) an unknown preset, scheme, reward or device, a negative seed,
+            scenarios that differ in more than positions, a reward that gives other than numbers.
         InputTypeError: (also a ``TypeError``) an argument of the wrong type.
 
     Example:
@@ -106,6 +113,8 @@ class SecureOffloadingEnv(EnvBase):
         seed: int | Sequence[int] | None = None,
         diagnostics: bool = False,
         fading: bool = False,
+        reward: Reward | Source | str = SUM_RATE,
+        entries: Sequence[str] = (),
     ) -> None:
         generator = scenario if isinstance(scenario, LayoutGenerator) else None
         if generator is not None:
@@ -123,6 +132,9 @@ class SecureOffloadingEnv(EnvBase):
         self.schemes = as_schemes(scheme, self.batch_size, self.scenario.num_helpers)
         self.diagnostics = checked(bool, "diagnostics", diagnostics)
         self.tells_fading = checked(bool, "fading", fading)
+        self.reward = self._checked_reward(as_reward(reward))
+        beside = () if self.reward == DEFAULT else (SUM_RATE,)
+        self._entries = tuple(dict.fromkeys((*entries, *beside)))
         rules = ModeRule.of(self.schemes, self.scenario.num_helpers, self.device)
         self._mode_rule = ModeRule(
             *(self._per_row(torch.as_tensor(flags, device=self.device)) for flags in rules)
@@ -136,6 +148,16 @@ class SecureOffloadingEnv(EnvBase):
         """Of the flights that :meth:`render` draws."""
         self.draws: Draws
         self._set_seed(seed)
+
+    def _checked_reward(self, reward: Reward) -> Reward:
+        """A function, of which it is known now what it depends on."""
+        if reward == DEFAULT:
+            return reward
+        if reward.is_transform:
+            accepted = f"{FUNCTION} (a transform is for make_env)"
+            raise InputError(rejection("reward", reward.name, accepted))
+        depends_on = reward.dependence(self.scenario, self.device)
+        return dataclasses.replace(reward, depends_on=depends_on)
 
     def _layout(self) -> Nodes:
         """Where the nodes are before the first slot, in each row where the rows differ."""
@@ -185,6 +207,11 @@ class SecureOffloadingEnv(EnvBase):
             self.observation_spec[name] = bounded(half, *values.shape)
         if self.tells_fading:
             self.observation_spec["fading"] = numbers(self.physics.link_row.size)
+        shapes = {"slot": (1,), "helper": (num_helpers,), "ue": (self.scenario.num_ues,)}
+        for name in self._entries:
+            require_choice("entry", name, ENTRIES)
+            make = flags if name == "offloading" else numbers
+            self.observation_spec[name] = make(*shapes[ENTRIES[name]])
         if self.diagnostics:
             self.observation_spec["diagnostics"] = diagnostics_spec(batch, self.scenario, device)
         # What a step reads besides the action; a reset may be given it too.
@@ -287,7 +314,7 @@ class SecureOffloadingEnv(EnvBase):
         action = action.to(torch.float32)  # as specified, whatever is given
         control = self.physics.control(action, self._norm_limit, self._mode_rule)
         after, outcome, tasks = self._slot(self._nodes(tensordict, position), control)
-        after["reward"] = reward = outcome.sum_rate
+        after["reward"] = reward = self.reward.of(outcome).to(outcome.sum_rate.dtype)
         after["done"] = torch.zeros_like(reward, dtype=torch.bool)
         after["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
         if self.diagnostics:
@@ -315,6 +342,8 @@ class SecureOffloadingEnv(EnvBase):
             batch_size=self.batch_size,
             device=self.device,
         )
+        for name in self._entries:
+            observed[name] = getattr(outcome, name)
         if self.tells_fading:
             observed["fading"] = self.observation_spec["fading"].one() if fading is None else fading
         return observed, outcome, tasks

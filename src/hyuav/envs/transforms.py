@@ -7,9 +7,13 @@ from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.envs import Compose, RewardSum, StepCounter, Transform, TransformedEnv
 
+from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import checked
+from hyuav.envs.arguments import as_scenarios
 from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.observation import JointView
+from hyuav.envs.reward import ENTRIES, EPISODE, Reward, Source
+from hyuav.envs.rewards import SUM_RATE, as_reward, sum_rate
 from hyuav.envs.secure_offloading import SecureOffloadingEnv
 from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.scenario import Scenario, ScenarioLike
@@ -21,10 +25,10 @@ WITHIN = 1.0 - 1e-6
 class OffMapPenalty(Transform):
     """Subtract r_om from the reward of a slot for each helper that would have left the map.
 
-    Reads ``off_map`` (..., H) and changes ``reward`` (..., 1) in bps/Hz.
+    Reads ``off_map`` (..., H) and changes ``reward`` (..., 1).
 
     Args:
-        penalty: r_om in bps/Hz.
+        penalty: r_om, in bps/Hz or whatever the reward is told in.
     """
 
     def __init__(self, penalty: float) -> None:
@@ -87,6 +91,7 @@ def make_env(
     clock: bool = False,
     geofence: bool = False,
     compiled: bool = False,
+    reward: Reward | Source | str = SUM_RATE,
 ) -> TransformedEnv:
     """The environment as a learner sees it: :class:`SecureOffloadingEnv` with its transforms.
 
@@ -108,18 +113,29 @@ def make_env(
         geofence: slow flights so that they end on the map; see :class:`Geofence`.
         compiled: run each slot as one compiled graph, which takes half a minute in the first step
             and pays for batches of thousands that fly thousands of slots.
+        reward: what a slot earns before the penalty: a :class:`hyuav.Reward`, or a function of the
+            slot's outcome, a transform of TorchRL or a name, of which one is made. The penalty is
+            then of the same unit.
 
     Raises:
         InputError: as :class:`SecureOffloadingEnv`.
     """
     checked(bool, "clock", clock)
     checked(bool, "geofence", geofence)
-    env = SecureOffloadingEnv(scenario, scheme, batch_size, device, seed, diagnostics, fading)
+    objective = as_reward(reward)
+    fixed = scenario.scenario if isinstance(scenario, LayoutGenerator) else scenario
+    below, entries, changes = _parts(objective, as_scenarios(fixed, ())[0][0])
+    env = SecureOffloadingEnv(
+        scenario, scheme, batch_size, device, seed, diagnostics, fading, below, entries
+    )
+    if changes:
+        _require_numbers(objective, env.scenario, env.device)
     kind = CompiledEnv if checked(bool, "compiled", compiled) else TransformedEnv
     transformed = kind(
         env,
         Compose(
             *([Geofence(env.scenario)] if geofence else []),
+            *changes,
             OffMapPenalty(env.scenario.off_map_penalty),
             RewardSum(),
             StepCounter(max_steps=env.scenario.num_slots),
@@ -129,3 +145,35 @@ def make_env(
     )
     _ = transformed.input_spec  # kept from now on: torch.compile cannot record how it is made
     return transformed
+
+
+def _parts(reward: Reward, scenario: Scenario) -> tuple[Reward, list[str], list[Transform]]:
+    """What the environment below earns and gives beside, and the transforms that change it."""
+    if not reward.is_transform:
+        return reward, [], []
+    changes = reward.transforms(scenario)
+    entries = [key for own in changes for key in own.in_keys or () if key in ENTRIES]
+    # It is known by the transform's name, and earns the sum-rate for the transform to change.
+    below = Reward(sum_rate, reward.name, reward.unit, reward.depends_on or EPISODE)
+    return below, entries, changes
+
+
+def _require_numbers(reward: Reward, scenario: Scenario, device: torch.device | None) -> None:
+    """Accept a transform that gives finite numbers where the helpers start.
+
+    Raises:
+        InputError: it fails, or gives something else.
+    """
+    below, entries, changes = _parts(reward, scenario)
+    env = SecureOffloadingEnv(
+        scenario, batch_size=3, device=device, seed=0, reward=below, entries=entries
+    )
+    hover = env.full_action_spec.zero()
+    around = RewardSum(), StepCounter()
+    try:
+        flown = TransformedEnv(env, Compose(*changes, *around), device=device)
+        earned = flown.step(flown.reset().update(hover))["next", "reward"]
+    except Exception as error:  # whichever the transform raises
+        accepted = f"a transform of TorchRL that works ({reward.told(error)})"
+        raise InputError(rejection("reward", reward.name, accepted)) from error
+    reward.require_numbers(earned, torch.Size((3, 1)))

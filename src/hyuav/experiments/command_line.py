@@ -7,7 +7,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 
 from hyuav.experiments.configuration_files import choosing_files
-from hyuav.experiments.own_algorithms import as_named
+from hyuav.experiments.own_code import as_named
 from hyuav.experiments.quoting import override
 
 _typed: list[str] = []

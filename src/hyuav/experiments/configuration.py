@@ -23,16 +23,17 @@ from omegaconf.errors import OmegaConfBaseException
 from hyuav._support.errors import Halted, InputError, Interrupted, cause, harmless, one_line
 from hyuav._support.interruption import interrupted_by_sigterm
 from hyuav._support.parameters import Parameters, mapping
+from hyuav._support.registry import file_name
 from hyuav._support.start import loaded, program
 from hyuav.experiments.command_line import remember
 from hyuav.experiments.configuration_files import read_files_as_data
 from hyuav.experiments.elsewhere import AS_TRAINED, as_trained
 from hyuav.experiments.mistakes import Vocabulary, explain, members_of
-from hyuav.experiments.own_algorithms import run_named, with_own
+from hyuav.experiments.own_code import Named, run_again, run_named, with_own
 from hyuav.experiments.scenarios import NAMES, offered
 from hyuav.experiments.tracking import LoggerParameters, loggers
 from hyuav.experiments.usage import usage
-from hyuav.learning.registry import ALGORITHMS, file_name, find, run_own
+from hyuav.learning.registry import ALGORITHMS
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
 """In the pattern of a run's directory, when the command was called."""
@@ -98,13 +99,12 @@ def recipe(
 
     def decorate(function: Callable[[Config, Path], None]) -> Callable[[], None]:
         composed = False
-        references: list[str] = []
+        own: list[Named] = []
 
         def run(config: DictConfig) -> None:
             nonlocal composed
             composed = True
-            for reference in references:  # which a launcher's worker has not run yet
-                run_own(reference)
+            run_again(own)  # a launcher's worker has not run it yet
             hint = "" if NOW in run_directory else ", and the same command goes on"
             with _job(hint) as directory:
                 function(_plain(config, names, groups, sections, vocabulary), directory)
@@ -113,7 +113,7 @@ def recipe(
         run.__module__ = "__main__"
 
         def command() -> None:
-            nonlocal composed, references
+            nonlocal composed, own
             composed = False
             os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra would exit before the lines below
             register(groups)
@@ -127,7 +127,7 @@ def recipe(
             with _ending_in_one_line(vocabulary, lambda: composed):
                 loaded()  # from here on an interruption is answered
                 remember()
-                references = run_named(chosen="algorithm" in groups)
+                own = run_named(chosen="algorithm" in groups)
                 register(groups)
                 read_files_as_data(groups, _completed)
                 vocabulary().refuse(sys.argv[1:])
@@ -226,7 +226,7 @@ def _completed(group: str, member: str, values: Config) -> Config:
         InputError: the file is of an unknown algorithm.
     """
     if group == "algorithm":
-        defaults = find(values.get("name", member))().to_dict()
+        defaults = ALGORITHMS.find(values.get("name", member))().to_dict()
     elif group == LOGGER:
         defaults = LoggerParameters.defaults()
     else:

@@ -28,15 +28,19 @@ from hyuav._support.parameters import (
     require_record,
 )
 from hyuav._support.randomness import derived_seed
+from hyuav.envs.reward import Reward, Source
+from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario, as_scenario
-from hyuav.references.optimum import RESOLUTION
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 EVALUATION_FILE, FLIGHTS_FILE = "evaluation.json", "flights.parquet"
+
+RETURNS = ("secrecy_sum_rate", "reward")
+"""What is told of each scheme with an interval; the latter only where it is not the former."""
 
 
 @pydantic_dataclass(frozen=True)
@@ -46,7 +50,9 @@ class EvaluationParameters(Parameters):
     episodes: Annotated[int, Field(ge=2, le=10**6)] = parameter(1000)
     flights: Count = parameter(3)
     seed: CountOrZero = parameter(10_000)
-    resolution: PositiveNumber = parameter(RESOLUTION, unit="m")
+    resolution: PositiveNumber | None = parameter(None, unit="m")
+    """Of the grid on which the optimum is found; None for 1 m, or 2 m where the reward depends on
+    the velocity."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +83,7 @@ def evaluate(
     device: torch.device | str | None = None,
     *,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
+    reward: Reward | Source | str = SUM_RATE,
 ) -> Evaluation:
     """Fly every scheme through the same draws of fading and tasks.
 
@@ -89,10 +96,12 @@ def evaluate(
         parameters: how many episodes, how many of them kept slot by slot, and the seed.
         device: to fly on.
         track: passes on the schemes one by one, as what shows the progress does.
+        reward: by which fractions of the optimum are told, and what is earned beside the secrecy
+            sum-rate; as for :func:`hyuav.make_env`.
 
     Raises:
         InputError: no scheme, an unknown one, one without a policy, or a policy of another number
-            of UEs.
+            of UEs; no such reward.
         InputTypeError: an argument of the wrong type.
     """
     scenario = as_scenario(scenario)
@@ -102,15 +111,17 @@ def evaluate(
     if not by_scheme:
         raise InputError(rejection("policies", policies, "at least one scheme"))
     require_record("parameters", parameters, EvaluationParameters)
+    reward = as_reward(reward)
     flown = {
         scheme: _together(
-            [fly(scenario, scheme, policy, parameters, device) for policy in by_scheme[scheme]]
+            [
+                fly(scenario, scheme, policy, parameters, device, reward)
+                for policy in by_scheme[scheme]
+            ]
         )
         for scheme in track([scheme for scheme in SCHEMES if scheme in by_scheme])
     }
-    returns = {
-        scheme: flights.totals["secrecy_sum_rate"].numpy() for scheme, flights in flown.items()
-    }
+    told = {} if reward == DEFAULT else {"reward": {"name": reward.name, "unit": reward.unit}}
     summary = {
         "scenario": name,
         "parameters": scenario.to_dict(),
@@ -118,9 +129,10 @@ def evaluate(
         "episodes": parameters.episodes,
         "seed": parameters.seed,
         "schemes": {
-            scheme: _returns(returns, scheme) | _account(flights.totals, scenario)
+            scheme: _returns(flown, scheme) | _account(flights.totals, scenario)
             for scheme, flights in flown.items()
         },
+        **told,
     }
     rows = [slot_table(scheme, flights.slots) for scheme, flights in flown.items()]
     return Evaluation(summary, pd.concat(rows, ignore_index=True))
@@ -150,6 +162,11 @@ class Flights:
     slots: TensorDictBase
     """What followed each slot of the first learner's first episodes: (flights, T)."""
 
+    @property
+    def earned(self) -> Tensor:
+        """By the reward, in each episode, without penalties: (learners, episodes) float64."""
+        return self.totals.get("reward", self.totals["secrecy_sum_rate"])
+
 
 @torch.no_grad()
 def fly(
@@ -158,6 +175,7 @@ def fly(
     policy: TensorDictModuleBase,
     parameters: EvaluationParameters,
     device: torch.device | str | None = None,
+    reward: Reward = DEFAULT,
 ) -> Flights:
     """Fly all learners of a policy through the same episodes, with diagnostics.
 
@@ -168,7 +186,7 @@ def fly(
     if isinstance(policy, Policy):
         trained_in, learners = policy.environment, policy.learners
     seeds = [derived_seed(parameters.seed, "evaluation")] * learners
-    asked = {"scenario": scenario, "scheme": SCHEMES[scheme].mode_rule}
+    asked = {"scenario": scenario, "scheme": SCHEMES[scheme].mode_rule, "reward": reward}
     env = make_env(
         **{**trained_in, **asked},
         batch_size=(learners, parameters.episodes),
@@ -181,7 +199,11 @@ def fly(
     state, slots = env.reset(), []
     for _ in range(scenario.num_slots):
         flown = env.step(module(state))
-        for name, values in _per_slot(flown["next"]).items():
+        found = _per_slot(flown["next"])
+        if reward != DEFAULT:
+            penalty = scenario.off_map_penalty * flown["next", "off_map"].sum(-1, keepdim=True)
+            found["reward"] = (flown["next", "reward"] + penalty).squeeze(-1)
+        for name, values in found.items():
             totals[name] = totals[name] + values if name in totals else values.double()
         slots.append(flown["next"][0, : parameters.flights].cpu())
         state = env.step_mdp(flown)
@@ -217,14 +239,15 @@ def secrecy_sum_rate(flown: TensorDictBase) -> Tensor:
     return flown["diagnostics", "secrecy_rate"].sum(dim=-1)
 
 
-def _returns(returns: Mapping[str, Array], scheme: str) -> dict[str, Any]:
-    """Mean return with its interval, and as a fraction of the optima flown in the same draws."""
-    own = returns[scheme]
-    mean = float(own.mean())
-    result: dict[str, Any] = {
-        "learners": len(own),
-        "secrecy_sum_rate": {"mean": mean, "ci95": confidence_interval(own)},
-    }
+def _returns(flown: Mapping[str, Flights], scheme: str) -> dict[str, Any]:
+    """Mean returns with intervals, and as a fraction of the optima flown in the same draws."""
+    returns = {name: flights.earned.numpy() for name, flights in flown.items()}
+    mean = float(returns[scheme].mean())
+    result: dict[str, Any] = {"learners": len(returns[scheme])}
+    for name in RETURNS:
+        if (own := flown[scheme].totals.get(name)) is not None:
+            interval = confidence_interval(own.numpy())
+            result[name] = {"mean": float(own.numpy().mean()), "ci95": interval}
     for field, optimum in (
         ("fraction_of_optimum", SCHEMES[scheme].optimum),
         ("fraction_of_hybrid_optimum", "optimum"),
@@ -254,10 +277,10 @@ def confidence_interval(returns: Array) -> list[float]:
 def _account(totals: Mapping[str, Tensor], scenario: Scenario) -> dict[str, Any]:
     """How the helper flew and what each node spent, per episode; shares are of all slots."""
     per_episode = {name: float(values.mean()) for name, values in totals.items()}
-    del per_episode["secrecy_sum_rate"]
     return {
         name: value / scenario.num_slots if name.endswith("_share") else value
         for name, value in per_episode.items()
+        if name not in RETURNS
     }
 
 

@@ -48,7 +48,7 @@ def select_initial_weights(
         track: passes on the episodes one by one, as what shows the progress does.
 
     Returns:
-        the chosen candidates' weights, and what they earn (N,) in bps/Hz.
+        the chosen candidates' weights, and what they earn (N,).
     """
     learners = configuration.learners
     rules = tuple(dict.fromkeys(learner.scheme for learner in learners))
@@ -65,6 +65,7 @@ def select_initial_weights(
         configuration.algorithm,
         dataclasses.replace(configuration.training, num_episodes=episodes),
         device,
+        configuration.reward,
     )
     for _ in track(training.episodes()):
         pass

@@ -31,7 +31,7 @@ METRIC_COLUMNS = (
 )
 """Columns of ``metrics.csv``; the mean loss of each gradient step follows.
 
-``evaluation`` is noise-free, ``sum_rate`` the same without the off-map penalty.
+``evaluation`` is noise-free, ``sum_rate`` the secrecy sum-rate of the same flights.
 """
 
 METRIC_NUMBERS = frozenset(METRIC_COLUMNS) - {"scheme"}

@@ -7,11 +7,14 @@ from tensordict.nn import TensorDictModuleBase
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.terminal import make_progress, print_line
+from hyuav.envs.reward import Reward
+from hyuav.envs.rewards import DEFAULT
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
 from hyuav.references.flight import FlightPolicy
+from hyuav.references.objectives import why_no_optimum
 from hyuav.references.optimum import solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
 
@@ -88,19 +91,25 @@ def straight_policies(scenario: Scenario) -> tuple[Policies, list[str]]:
     return policies, left_out
 
 
-def reference_policies(scenario: Scenario, resolution: float, console: Console) -> Policies:
-    """Re-LT, Ja-LT and the exact optimum of each mode rule.
+def reference_policies(
+    scenario: Scenario, resolution: float | None, console: Console, reward: Reward = DEFAULT
+) -> Policies:
+    """Re-LT, Ja-LT and the exact optimum of each mode rule, where there is one.
 
     Args:
         scenario: to fly.
-        resolution: of the optimum's grid in m.
-        console: for the straight flights that are left out, and for the progress.
+        resolution: of the optimum's grid in m; None for the default.
+        console: for what is left out, and for the progress.
+        reward: of which it is the optimum.
     """
     policies, left_out = straight_policies(scenario)
     for line in left_out:
         print_line(line, console)
+    if (reason := why_no_optimum(reward, scenario)) is not None:
+        print_line(f"reward = {reward.name}: {reason}", console)
+        return policies
     with make_progress(console, "optima") as progress:
-        optima = solve_optimum(scenario, resolution=resolution, track=progress.track)
+        optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario)]
     return policies

@@ -11,7 +11,7 @@ from torchrl.envs import TransformedEnv
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.learning.policy import Policy
-from hyuav.learning.registry import run_own
+from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
 
@@ -117,6 +117,6 @@ def load(path: str | Path, algorithm: str | None = None) -> Run:
         >>> run.policy.export("policy.onnx")
     """
     if algorithm is not None:
-        run_own(algorithm)
+        ALGORITHMS.run_own(algorithm)
     directory = RunDirectory(path)
     return Run(directory, directory.configuration())

@@ -18,12 +18,14 @@ from hyuav._support.errors import BusyError, InputError, rejection
 from hyuav._support.files import create_durably, require_writable, write_durably
 from hyuav._support.parameters import checked, mapping
 from hyuav._support.yaml_files import read_yaml
+from hyuav.envs.reward import Reward
+from hyuav.envs.rewards import DEFAULT, REWARDS, SUM_RATE
 from hyuav.experiments.metrics import read_metrics
 from hyuav.experiments.scenarios import named_scenario
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
 from hyuav.learning.policy import Policy, learned_policy
-from hyuav.learning.registry import find
+from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.learning.weights import count_learners
@@ -45,6 +47,13 @@ class RunConfiguration:
     algorithm_name: str
     algorithm: AlgorithmParameters
     training: TrainingParameters
+    reward: Reward = DEFAULT
+    """What a slot earns, one that its name finds again."""
+
+    def __post_init__(self) -> None:
+        if REWARDS.get(self.reward.name) != self.reward:
+            accepted = "one of the package, of a package's entry point or of a file that is named"
+            raise InputError(rejection("reward", self.reward.name, accepted))
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "RunConfiguration":
@@ -65,6 +74,7 @@ class RunConfiguration:
             algorithm_name,
             algorithm,
             TrainingParameters.from_dict(mapping("training", values["training"])),
+            REWARDS.find(values.get("reward", SUM_RATE)),  # which older runs do not name
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -74,6 +84,7 @@ class RunConfiguration:
             "learners": [learner.to_dict() for learner in self.learners],
             "algorithm": {"name": self.algorithm_name, **self.algorithm.to_dict()},
             "training": self.training.to_dict(),
+            "reward": self.reward.name,
         }
 
     @property
@@ -98,7 +109,8 @@ class RunConfiguration:
         Raises:
             InputError: as :class:`hyuav.learning.training.Training`.
         """
-        return Training(self.scenario, self.learners, self.algorithm, self.training, device)
+        parameters = self.algorithm, self.training
+        return Training(self.scenario, self.learners, *parameters, device, self.reward)
 
     @property
     def horizons(self) -> tuple[int, ...]:
@@ -117,7 +129,7 @@ class RunConfiguration:
         """
         scenario = dataclasses.replace(self.scenario, num_slots=self.horizons[learners[0]])
         scheme = self.learners[learners[0]].scheme
-        return learned_policy(scenario, self.algorithm, weights, learners, scheme)
+        return learned_policy(scenario, self.algorithm, weights, learners, scheme, self.reward)
 
 
 Learners = Annotated[tuple[Learner, ...], Field(min_length=1, description="a list of learners")]
@@ -140,7 +152,7 @@ def named_algorithm(values: object) -> tuple[str, AlgorithmParameters]:
     """An algorithm and its name, from its hyperparameters with a ``name``."""
     fields = mapping("algorithm", values)
     name = fields.pop("name", None)
-    return str(name), find(name).from_dict(fields)
+    return str(name), ALGORITHMS.find(name).from_dict(fields)
 
 
 class RunDirectory:

@@ -16,9 +16,11 @@ from torch import Tensor, nn
 from torchrl.envs import TransformedEnv
 from torchrl.objectives import LossModule, SoftUpdate, ValueEstimators
 
+from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import Count, Fraction, OneOf, Parameters, PositiveNumber, parameter
 from hyuav._support.randomness import RowStream
 from hyuav.envs.observation import ObservationLayout
+from hyuav.envs.reward import VELOCITY, Reward
 from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.memory import Need, needed_for_networks
 from hyuav.learning.networks import ACTIVATIONS, AfterstateCritic, LearnerMLP, ScaledTanh
@@ -107,6 +109,16 @@ class AlgorithmParameters(Parameters, ABC):
             seeds: of their random numbers.
         """
         return algorithm
+
+    def require_suited(self, reward: Reward) -> None:
+        """Accept a reward of which these parameters assume nothing that does not hold.
+
+        Raises:
+            InputError: critics would see where actions lead alone, and it depends on the velocity.
+        """
+        if self.afterstate and reward.depends_on == VELOCITY:
+            accepted = f"false, because reward = {reward.name} depends on the velocity"
+            raise InputError(rejection("algorithm.afterstate", self.afterstate, accepted))
 
     def least_replay(self, num_slots: int) -> int:  # noqa: ARG002
         """How many slots a replay buffer must hold at least, with episodes of so many."""

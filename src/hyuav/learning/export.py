@@ -44,7 +44,7 @@ def export(
     if not isinstance(path, str | Path) or Path(path).suffix not in ENCODERS:
         accepted = f"a file name that ends in {', '.join(ENCODERS)}"
         raise InputError(rejection("path", path if isinstance(path, str) else str(path), accepted))
-    encode, told = ENCODERS[Path(path).suffix], json.dumps(environment, default=Parameters.to_dict)
+    encode, told = ENCODERS[Path(path).suffix], json.dumps(environment, default=_plain)
     own = copy.deepcopy(network).to(example).requires_grad_(False).eval()
     with _quiet():
         content = encode(own, example, told)
@@ -58,6 +58,11 @@ def export(
 def _dynamic(example: Tensor) -> tuple[dict[int, torch.export.Dim]]:
     """Which axis of the input may have any length."""
     return ({example.ndim - 2: torch.export.Dim("batch")},)
+
+
+def _plain(value: Any) -> Any:
+    """A scenario by its fields, a reward by its name."""
+    return value.to_dict() if isinstance(value, Parameters) else value.name
 
 
 def _onnx(network: nn.Module, example: Tensor, environment: str) -> bytes:

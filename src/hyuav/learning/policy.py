@@ -13,14 +13,16 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor, nn
 from torchrl.envs import TransformedEnv
 
-from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
+from hyuav._support.errors import InputError, InputTypeError, rejection
 from hyuav._support.parameters import Count, checked
 from hyuav.envs.observation import ObservationLayout
+from hyuav.envs.reward import Reward, Source
+from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, made_on
 from hyuav.learning.export import export
 from hyuav.learning.weights import load_weights, select_learners
-from hyuav.physics.modes import MODE_RULES
+from hyuav.physics.modes import fixed_modes
 from hyuav.physics.scenario import Scenario, as_scenario
 
 Observed = TypeVar("Observed", Tensor, NDArray[Any], TensorDictBase)
@@ -30,8 +32,8 @@ class NoiseFreeReturn(NamedTuple):
     """What actors earn without noise, on average over the same episodes."""
 
     reward: Tensor
-    """(N,) bps/Hz, accumulated, with penalties; less what a guide knows to be chance, so that
-    flights are told apart that differ by less."""
+    """(N,) in the unit of the reward, accumulated, with penalties; less what a guide knows to be
+    chance, so that flights are told apart that differ by less."""
     sum_rate: Tensor
     """(N,) bps/Hz, the accumulated secrecy sum-rate alone."""
 
@@ -53,16 +55,19 @@ def fly_noise_free(
     """
     scenario, learners = env.base_env.scenario, env.batch_size[0]
     layout = ObservationLayout(scenario, clock=False)  # places stand first, clock or not
-    off_map, control_term = torch.zeros(2, learners, dtype=torch.float32, device=env.device)
+    off_map, control_term, told = torch.zeros(3, learners, dtype=torch.float32, device=env.device)
+    is_told = env.base_env.reward != DEFAULT
     state, positions = env.reset(), []
     for _ in range(scenario.num_slots):
         slot = env.step(algorithm.actor(state))
         control_term += algorithm.guide.control_term(slot).mean(dim=(1, 2))
         state = env.step_mdp(slot)
         off_map += state["off_map"].sum(dim=-1).float().mean(dim=-1)
+        if is_told:
+            told += state[SUM_RATE].squeeze(-1).mean(dim=-1)
         positions.append(layout.position(state["observation"])[:, 0])
     reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
-    sum_rate = reward + scenario.off_map_penalty * off_map
+    sum_rate = told if is_told else reward + scenario.off_map_penalty * off_map
     earned = NoiseFreeReturn(reward - control_term / reward_scale, sum_rate)
     return earned, torch.stack(positions)
 
@@ -83,6 +88,7 @@ class Policy(TensorDictModuleBase):
         scheme: who chose the mode there: "hybrid", "relay" or "jamming".
         clock: whether ``observation`` carried the slots flown; see :func:`hyuav.make_env`.
         geofence: whether flights were slowed to end on the map.
+        reward: what a slot earned; see :class:`hyuav.Reward`.
         learners: N. With one, it flies a batch of any shape; of several, each flies one row of the
             batch's first dimension.
 
@@ -106,15 +112,18 @@ class Policy(TensorDictModuleBase):
         *,
         clock: bool = False,
         geofence: bool = False,
+        reward: Reward | Source | str = SUM_RATE,
         learners: int = 1,
     ) -> None:
         super().__init__()
-        require_choice("scheme", scheme, MODE_RULES)
+        scenario, objective = as_scenario(scenario), as_reward(reward)
+        fixed_modes(scheme, scenario.num_helpers)
         self.environment: dict[str, Any] = {
-            "scenario": as_scenario(scenario),
+            "scenario": scenario,
             "scheme": scheme,
             "clock": checked(bool, "clock", clock),
             "geofence": checked(bool, "geofence", geofence),
+            **({} if objective == DEFAULT else {"reward": objective}),
         }
         """The arguments of :func:`hyuav.make_env`, and of ``gymnasium.make``, by which an
         environment is what it was in training."""
@@ -282,6 +291,7 @@ def learned_policy(
     weights: dict[str, Tensor],
     learners: Sequence[int] = (0,),
     scheme: str = "hybrid",
+    reward: Reward = DEFAULT,
 ) -> Policy:
     """The noise-free actors of learners, of which no gradient is kept.
 
@@ -291,6 +301,7 @@ def learned_policy(
         weights: of all learners, as a training saves them.
         learners: which of them.
         scheme: of theirs.
+        reward: that they learned to earn.
 
     Raises:
         InputError: the weights do not fit the algorithm or the number of UEs.
@@ -307,5 +318,6 @@ def learned_policy(
         scheme,
         clock=algorithm.clock,
         geofence=algorithm.geofence,
+        reward=reward,
         learners=len(learners),
     )

@@ -20,6 +20,8 @@ from hyuav._support.randomness import (
     standard_normal,
     uniform,
 )
+from hyuav.envs.reward import Reward
+from hyuav.envs.rewards import DEFAULT
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, made_on
 from hyuav.learning.checkpoint import (
@@ -82,6 +84,7 @@ class Cohort:
         replay_size: transitions kept of each learner.
         batch_size: K.
         device: of all tensors.
+        reward: what a slot earns.
     """
 
     def __init__(
@@ -92,15 +95,16 @@ class Cohort:
         replay_size: int,
         batch_size: int,
         device: torch.device | str | None,
+        reward: Reward = DEFAULT,
     ) -> None:
         self._flown, self.learners = scenario, tuple(learners)
         self._parameters, self._transitions = parameters, parameters.transitions
         seeds = [learner.seed for learner in learners]
         schemes = [learner.scheme for learner in learners]
-        self.env = make_env(
-            scenario, schemes, (len(seeds),), device, seeds, **parameters.environment
-        )
+        self._options: dict[str, Any] = {"reward": reward, **parameters.environment}
+        self.env = make_env(scenario, schemes, (len(seeds),), device, seeds, **self._options)
         self.scenario: Scenario = self.env.base_env.scenario
+        parameters.require_suited(self.env.base_env.reward)
         # Line 1: actor mu, critic Q, their targets and the replay buffer B.
         with made_on(self.env.device):
             algorithm = parameters.build(len(seeds), self.scenario)
@@ -268,7 +272,7 @@ class Cohort:
             (len(self.learners), episodes),
             self.env.device,
             [derived_seed(seed, "evaluation")] * len(self.learners),
-            **self._parameters.environment,
+            **self._options,
         )
         return fly_noise_free(env, self.algorithm, self._parameters.reward_scale)
 

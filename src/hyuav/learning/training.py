@@ -28,6 +28,8 @@ from hyuav._support.parameters import (
 )
 from hyuav._support.recording import COMPILATION_ERRORS, has_compiler
 from hyuav.envs.arguments import as_device
+from hyuav.envs.reward import Reward, Source
+from hyuav.envs.rewards import SUM_RATE, as_reward
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import require_entries, require_like
 from hyuav.learning.compile import FlownEpisode
@@ -111,9 +113,11 @@ class Training:
         algorithm: which one, with its hyperparameters.
         parameters: how long and on what to learn.
         device: of all tensors.
+        reward: what a slot earns, as for :func:`hyuav.make_env`.
 
     Raises:
-        InputError: an unknown device, an algorithm that knows one layout where layouts are drawn;
+        InputError: an unknown device, an algorithm that knows one layout where layouts are drawn, a
+            reward that is none or does not suit the algorithm;
             later, where it must be compiled, no working compiler.
         InputTypeError: an argument of the wrong type.
     """
@@ -125,6 +129,7 @@ class Training:
         algorithm: AlgorithmParameters,
         parameters: TrainingParameters,
         device: torch.device | str | None = None,
+        reward: Reward | Source | str = SUM_RATE,
     ) -> None:
         if not isinstance(algorithm, AlgorithmParameters):
             raise InputTypeError(rejection("algorithm", algorithm, "DDPG(), TD3() or SAC()"))
@@ -138,7 +143,7 @@ class Training:
             self.scenario = scenario = as_scenario(scenario)
         self.parameters = parameters
         self._algorithm = algorithm
-        self.learners = as_learners(learners)
+        self.learners, self.reward = as_learners(learners), as_reward(reward)
         device = as_device(device)
         on_cpu = device.type == "cpu"
         size = LARGEST_COHORT if on_cpu else math.inf
@@ -159,6 +164,7 @@ class Training:
                 parameters.replay_size,
                 parameters.batch_size,
                 device,
+                self.reward,
             )
             for members in self._members
         ]
@@ -209,7 +215,9 @@ class Training:
         weights = self.best_weights
         own = [dataclasses.replace(self.scenario, num_slots=horizon) for horizon in self.horizons]
         return tuple(
-            learned_policy(own[index], self._algorithm, weights, [index], learner.scheme)
+            learned_policy(
+                own[index], self._algorithm, weights, [index], learner.scheme, self.reward
+            )
             for index, learner in enumerate(self.learners)
         )
 

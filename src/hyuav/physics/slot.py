@@ -59,6 +59,8 @@ class SlotOutcome(NamedTuple):
     """The secrecy sum-rate in the chosen modes: (..., 1) bps/Hz."""
     relays: Tensor
     """(..., H) bool, which helpers relay; the others jam."""
+    scenario: Scenario
+    """That is flown."""
 
     @property
     def relay(self) -> ModeOutcome:
@@ -93,6 +95,44 @@ class SlotOutcome(NamedTuple):
         for taken, other in zip(self.taken, others, strict=True):
             chosen = torch.where(taken, other, chosen)
         return chosen
+
+    @property
+    def offloading_rate(self) -> Tensor:
+        """The secrecy rate of the UEs that offload, 0 for the others: (..., U) bps/Hz."""
+        return self.secrecy_rate * self.offloading
+
+    @property
+    def flight_energy(self) -> Tensor:
+        """What flying takes: (..., H) J."""
+        scenario = self.scenario
+        return energy.flight_energy(
+            self.control.velocity, scenario.helper_mass, scenario.slot_duration
+        )
+
+    @property
+    def helper_transmission_energy(self) -> Tensor:
+        """What relaying or jamming takes: (..., H) J."""
+        scenario, way = self.scenario, self.way
+        helpers = torch.arange(1, scenario.num_helpers + 1, device=way.device)
+        through = ((way * self.offloading).unsqueeze(-1) == helpers).sum(dim=-2)
+        share = scenario.slot_duration / scenario.num_ues
+        relaying = energy.relay_energy(
+            through.to(self.distances.dtype), scenario.relay_power, share
+        )
+        jamming = energy.jamming_energy(scenario.jamming_power, scenario.slot_duration)
+        spent = torch.where(self.relays, relaying, torch.full_like(relaying, jamming))
+        return spent if self.control.power is None else spent * self.control.power
+
+    @property
+    def ue_transmission_energy(self) -> Tensor:
+        """What offloading takes the UEs that offload, 0 for the others: (..., U) J."""
+        scenario = self.scenario
+        of_way = scenario.ue_power, scenario.slot_duration, scenario.num_ues
+        relayed, straight = (
+            self.distances.new_full((), energy.offloading_energy(*of_way, relay=relay))
+            for relay in (True, False)
+        )
+        return torch.where(self.way > 0, relayed, straight) * self.offloading
 
 
 class StandingNodes(NamedTuple):
@@ -405,6 +445,27 @@ def slot(
     geometry = physics.geometry(nodes)
     gains = geometry.gains.faded(fading)
     outcomes = physics.outcomes(geometry, gains, tasks, control.power)
+    return chosen(physics, nodes, control, moved.off_map, geometry.distances, outcomes)
+
+
+def chosen(
+    physics: Physics,
+    nodes: Nodes,
+    control: Control,
+    off_map: Tensor,
+    distances: Tensor,
+    outcomes: tuple[ModeOutcome, ...],
+) -> SlotOutcome:
+    """Choose the modes by what each brings: line 9 of Algorithm 1.
+
+    Args:
+        physics: the scenario's constants.
+        nodes: where all are in the slot.
+        control: what the helpers do, with the mode rule.
+        off_map: (..., H) bool, as in :class:`SlotOutcome`, like the next.
+        distances: (..., H, U + 1 + E) m.
+        outcomes: what :meth:`Physics.outcomes` gives for all modes.
+    """
     taken = []
     best, relays = outcomes[0].sum_rate.unsqueeze(-1), physics.mode_vectors[0]
     for number, outcome in enumerate(outcomes[1:], start=1):
@@ -413,5 +474,13 @@ def slot(
         best = torch.where(taken[-1], sum_rate, best)
         relays = torch.where(taken[-1], physics.mode_vectors[number], relays)
     return SlotOutcome(
-        nodes, control, moved.off_map, geometry.distances, outcomes, tuple(taken), best, relays
+        nodes,
+        control,
+        off_map,
+        distances,
+        outcomes,
+        tuple(taken),
+        best,
+        relays,
+        physics.scenario,
     )

@@ -106,13 +106,21 @@ class Reach:
         self._squared_norm = offsets[:, None] ** 2 + offsets**2
         self._reachable = np.abs(offsets) <= columns[np.abs(offsets)][:, None]
 
+    @property
+    def displacements(self) -> NDArray[np.int64]:
+        """All that one slot of flight allows, in grid spacings: (D, 2)."""
+        return np.argwhere(self._reachable) - self._reachable.shape[0] // 2
+
     def best(self, values: Values, helper: int = 0) -> Values:
         """The largest value within a helper's reach of each grid point.
 
         Args:
-            values: (X, Y), or those of all pairs, ... of helpers' grid points, (X, Y, X', Y', ...).
+            values: (X, Y), of arriving at each grid point, or (D, X, Y), by each displacement; or
+                those of all pairs, ... of helpers' grid points, (X, Y, X', Y', ...).
             helper: which of them flies.
         """
+        if values.ndim == 3:
+            return self._best_of_each(values)
         best = np.full_like(values, -np.inf)
         own = slice(2 * helper, 2 * helper + 2)
         for half_widths in self.boxes:
@@ -122,6 +130,17 @@ class Reach:
             size[own] = [2 * min(h, n - 1) + 1 for h, n in widths]
             # Repeating the edge adds no value that the cut window does not hold already.
             np.maximum(best, maximum_filter(values, size, mode="nearest"), out=best)
+        return best
+
+    def _best_of_each(self, values: Values) -> Values:
+        best = np.full(values.shape[1:], -np.inf)
+        for arriving, displacement in zip(values, self.displacements, strict=True):
+            shape: tuple[int, ...] = best.shape
+            moves: list[int] = displacement.tolist()
+            moved = list(zip(moves, shape, strict=True))
+            here = tuple(slice(max(-move, 0), size - max(move, 0)) for move, size in moved)
+            there = tuple(slice(max(move, 0), size - max(-move, 0)) for move, size in moved)
+            np.maximum(best[here], arriving[there], out=best[here])
         return best
 
     def within(self, grid: Grid, point: tuple[int, int]) -> NDArray[np.bool_]:
@@ -137,9 +156,17 @@ class Reach:
         """The grid point with the largest value within reach of ``point``; of equals the nearest.
 
         Args:
-            values: (X, Y).
+            values: (X, Y) or (D, X, Y), as for :meth:`best`.
             point: row and column.
         """
+        if values.ndim == 3:
+            ends = self.displacements + point
+            inside = ((ends >= 0) & (ends < values.shape[1:])).all(axis=1)
+            worth = np.full(len(ends), -np.inf)
+            worth[inside] = values[inside, *ends[inside].T]
+            norms = np.square(self.displacements).sum(axis=1)
+            row, column = ends[np.where(worth == worth.max(), norms, np.inf).argmin()]
+            return int(row), int(column)
         span = self._reachable.shape[0] // 2
         low = [max(index - span, 0) for index in point]
         grid_window = tuple(
@@ -162,14 +189,14 @@ def values_to_go(rewards: Sequence[Values], reach: Reach) -> list[Values]:
     V_t(x) = max over x' within reach of x of [reward_{t+1}(x') + V_{t+1}(x')] and V_T = 0.
 
     Args:
-        rewards: of the T slots, expected at each grid point, (X, Y) bps/Hz; -infinity for one
-            where the helper may not be.
+        rewards: of the T slots, expected at each grid point, (X, Y), -infinity for one where the
+            helper may not be; or by the displacement that leads there, (D, X, Y).
         reach: of one slot.
 
     Returns:
         T arrays (X, Y) in bps/Hz.
     """
-    values = [np.zeros_like(rewards[-1])]
+    values = [np.zeros(rewards[-1].shape[-2:])]
     for reward in reversed(rewards[1:]):
         values.append(reach.best(reward + values[-1]))
     return values[::-1]

@@ -25,13 +25,14 @@ from torch import Tensor
 from hyuav._support.errors import InputError, InputTypeError, rejection
 from hyuav._support.parameters import LARGEST_COUNT, OneOrMore, checked, plain
 from hyuav.envs.arguments import as_seed
+from hyuav.envs.reward import Reward, Source
+from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.physics.modes import MODE_RULES, fixed_modes
 from hyuav.physics.scenario import Scenario, ScenarioLike, as_scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.bounds import CellBounds
 from hyuav.references.flight import flyable
 from hyuav.references.grid import (
-    Reach,
     Values,
     best_flight,
     grid_over_map,
@@ -39,11 +40,23 @@ from hyuav.references.grid import (
     values_to_go,
 )
 from hyuav.references.joint import SeveralHelpers
+from hyuav.references.objectives import (
+    depends_on_velocity,
+    estimate_objective,
+    reward_maps,
+    why_no_optimum,
+)
 from hyuav.references.power import best_levels
 from hyuav.references.rewards import ExpectedReward, estimate_return
 
 RESOLUTION = 1.0
 """Default grid spacing in metres: halving it moves no preset's value by 0.2 %."""
+
+COARSE_RESOLUTION = 2.0
+"""The same where a reward depends on the velocity, of which there are hundreds then."""
+
+DRAWS, FEW_DRAWS = 256, 64
+"""By default, of a slot's fading and tasks; fewer where a reward depends on the velocity."""
 
 MEMORY_LIMIT = 4 * 2**30
 """Bytes that the value tables may take."""
@@ -67,9 +80,10 @@ class Optimum:
     resolution: float
     """Spacing of the grid in metres."""
     value: float
-    """Expected undiscounted return of the flight in bps/Hz, from draws that did not choose it."""
+    """Expected undiscounted return of the flight in the unit of the reward, from draws that did not
+    choose it."""
     standard_error: float
-    """Of ``value`` in bps/Hz; 0 where no slot is random."""
+    """Of ``value``; 0 where no slot is random."""
     path: Tensor
     """(T + 1, H, 2) m, float64: where the helpers are before the first slot and in each slot."""
     modes: Tensor
@@ -79,20 +93,21 @@ class Optimum:
     share: Tensor
     """(T, H): the same in units of the nominal power."""
     upper_bound: float | None = None
-    """Of what any flight earns, in bps/Hz; None where none is computed."""
+    """Of what any flight earns; None where none is computed."""
 
 
 def solve_optimum(
     scenario: ScenarioLike,
     mode_rules: Sequence[str] = MODE_RULES,
     *,
-    resolution: float = RESOLUTION,
+    resolution: float | None = None,
     power_step: float = 1.0,
-    draws: int = 256,
+    draws: int | None = None,
     evaluation_draws: int = 10_000,
     seed: int = 0,
     certify: bool = False,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
+    reward: Reward | Source | str = SUM_RATE,
 ) -> dict[str, Optimum]:
     """The best flight under each mode rule over the scenario's T slots.
 
@@ -100,22 +115,28 @@ def solve_optimum(
         scenario: node positions and parameters, or the name of a preset.
         mode_rules: who may choose the modes: of :data:`hyuav.physics.modes.MODE_RULES`, or a
             letter r or j for each helper.
-        resolution: spacing of the grid in m; the helpers' starts are grid points.
+        resolution: spacing of the grid in m; the helpers' starts are grid points. None for
+            :data:`RESOLUTION`, or :data:`COARSE_RESOLUTION` where the reward depends on the
+            velocity.
         power_step: between the levels of power that are tried, in dB, where it is controlled.
         draws: of a slot's fading and tasks that the expected reward is averaged over, the same
-            at all positions. They choose the flight and nothing else.
+            at all positions. They choose the flight and nothing else. None for :data:`DRAWS`, or
+            :data:`FEW_DRAWS`.
         evaluation_draws: of whole episodes, from which the flight's value is estimated.
         seed: of all draws; not used where no slot is random.
         certify: give the upper bound too, which takes some seconds; always given for several
             helpers.
         track: passes on the mode rules one by one, as what shows the progress does.
+        reward: what a slot earns, as for :func:`hyuav.make_env`; the mode is chosen by the secrecy
+            sum-rate whatever it is. There is no optimum of one that does not add up over slots.
 
     Returns:
         an :class:`Optimum` for each mode rule.
 
     Raises:
         InputError: (a ``ValueError``) an unknown preset or mode rule, a resolution that is not
-            above 0 or needs more than :data:`MEMORY_LIMIT`, fewer than two draws.
+            above 0 or needs more than :data:`MEMORY_LIMIT`, fewer than two draws, a reward of which
+            there is no optimum.
         InputTypeError: (also a ``TypeError``) an argument of the wrong type.
     """
     scenario = as_scenario(scenario)
@@ -130,6 +151,7 @@ def solve_optimum(
         seed=seed,
         certify=certify,
         track=track,
+        reward=reward,
     )
     return {mode_rule: optima[scenario.num_slots] for mode_rule, optima in found.items()}
 
@@ -139,13 +161,14 @@ def solve_horizons(
     horizons: Sequence[int],
     mode_rules: Sequence[str] = MODE_RULES,
     *,
-    resolution: float = RESOLUTION,
+    resolution: float | None = None,
     power_step: float = 1.0,
-    draws: int = 256,
+    draws: int | None = None,
     evaluation_draws: int = 10_000,
     seed: int = 0,
     certify: bool = False,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
+    reward: Reward | Source | str = SUM_RATE,
 ) -> dict[str, dict[int, Optimum]]:
     """The best flight under each mode rule over each horizon, from one backward pass.
 
@@ -161,6 +184,7 @@ def solve_horizons(
         seed: of all draws.
         certify: give upper bounds too.
         track: passes on the mode rules.
+        reward: what a slot earns.
 
     Returns:
         by mode rule and horizon.
@@ -175,21 +199,29 @@ def solve_horizons(
     checked(PowerStep, "power_step", power_step)
     scenarios = _with_horizons(scenario, horizons)
     longest = max(scenarios)
-    draws = checked(_Draws, "draws", draws)
+    reward = as_reward(reward)
+    if (reason := why_no_optimum(reward, scenario)) is not None:
+        raise InputError(rejection("reward", reward.name, f"one that has an optimum ({reason})"))
+    few = depends_on_velocity(reward, scenario)
+    draws = checked(_Draws, "draws", draws or (FEW_DRAWS if few else DRAWS))
     evaluation_draws = checked(_Draws, "evaluation_draws", evaluation_draws)
-    resolution = plain(resolution)
-    require_resolution(resolution, scenario.map_side, longest)
+    resolution = usable_resolution(plain(resolution), scenario, longest, reward)
     root = torch.Generator().manual_seed(as_seed(seed))
     map_seed, evaluation_seed = torch.randint(2**62, (2,), generator=root, device="cpu").tolist()
 
-    physics = Physics(scenario, dtype=torch.float64)
-    one = scenario.num_helpers == 1
-    planner: _OneHelper | SeveralHelpers = (
-        _OneHelper(physics, mode_rules, longest, resolution, power_step, draws, map_seed)
-        if one
-        else SeveralHelpers(physics, resolution, power_step, draws, map_seed)
-    )
-    bounds = CellBounds(physics, map_seed) if certify or not one else None
+    physics, one = Physics(scenario, dtype=torch.float64), scenario.num_helpers == 1
+    planner: _OneHelper | SeveralHelpers
+    if one:
+        planner = _OneHelper(physics, mode_rules, longest, resolution)
+        if reward == DEFAULT:
+            planner.earn_sum_rate(power_step, draws, map_seed)
+        else:
+            planner.earn(reward, draws, map_seed)
+    else:
+        planner = SeveralHelpers(physics, resolution, power_step, draws, map_seed)
+    bounds = None
+    if reward == DEFAULT and (certify or not one):
+        bounds = CellBounds(physics, map_seed)
     optima: dict[str, dict[int, Optimum]] = {}
     for mode_rule in track(mode_rules):
         optima[mode_rule] = {}
@@ -201,6 +233,11 @@ def solve_horizons(
             value, error, modes = estimate_return(
                 physics, path, mode_rule, evaluation_draws, generator, share
             )
+            if reward != DEFAULT:
+                generator.manual_seed(evaluation_seed)
+                value, error = estimate_objective(
+                    physics, path, mode_rule, evaluation_draws, generator, reward
+                )
             optima[mode_rule][horizon] = Optimum(
                 shorter,
                 mode_rule,
@@ -214,6 +251,27 @@ def solve_horizons(
                 None if bounds is None else bounds.of(mode_rule, horizon),
             )
     return optima
+
+
+def usable_resolution(
+    resolution: float | None, scenario: Scenario, num_slots: int, reward: Reward = DEFAULT
+) -> float:
+    """A grid spacing in m, the default where it is None, whose tables fit :data:`MEMORY_LIMIT`.
+
+    Raises:
+        InputError: it is not above 0, or too fine.
+        InputTypeError: it is not a number.
+    """
+    by_flight = depends_on_velocity(reward, scenario)
+    if resolution is None:
+        resolution = COARSE_RESOLUTION if by_flight else RESOLUTION
+    require_resolution(resolution, scenario.map_side, num_slots)
+    reached = 2 * scenario.max_speed * scenario.slot_duration / resolution + 1
+    points = scenario.map_side / resolution + 1
+    if by_flight and 8 * 3 * (reached * points) ** 2 > MEMORY_LIMIT:
+        accepted = "a number of metres for which each displacement has a table (within 4 GiB)"
+        raise InputError(rejection("resolution", resolution, accepted))
+    return resolution
 
 
 def _with_horizons(scenario: Scenario, horizons: Sequence[int]) -> dict[int, Scenario]:
@@ -248,40 +306,66 @@ class _OneHelper:
         mode_rules: that are asked for.
         num_slots: the longest horizon.
         resolution: spacing of the grid in m.
-        power_step: between the levels of power in dB.
-        draws: of a slot's fading and tasks that the expected reward is averaged over.
-        seed: of the draws.
     """
 
     def __init__(
-        self,
-        physics: Physics,
-        mode_rules: Sequence[str],
-        num_slots: int,
-        resolution: float,
-        power_step: float,
-        draws: int,
-        seed: int,
+        self, physics: Physics, mode_rules: Sequence[str], num_slots: int, resolution: float
     ) -> None:
-        expected = ExpectedReward(physics, draws, torch.Generator().manual_seed(seed))
-        quiet = ExpectedReward(physics, 1, torch.Generator().manual_seed(seed))
+        self._physics, self._rules, self._num_slots = physics, mode_rules, num_slots
+        self._resolution = resolution
         self._grid = grid_over_map(physics.scenario, resolution)
+        self._reaches = {rule: reaches_of(physics, rule, resolution)[0] for rule in mode_rules}
+        self._values: dict[str, tuple[list[Values], list[Values], Tensor]] = {}
+
+    def earn_sum_rate(self, power_step: float, draws: int, seed: int) -> None:
+        """Let flights earn the secrecy sum-rate, with the best power at each place.
+
+        Args:
+            power_step: between the levels of power in dB.
+            draws: of a slot's fading and tasks that the expected reward is averaged over.
+            seed: of the draws.
+        """
+        expected, quiet = (
+            ExpectedReward(self._physics, count, torch.Generator().manual_seed(seed))
+            for count in (draws, 1)
+        )
         places = self._grid.positions().unsqueeze(1)
         nominal = places.new_ones(len(places), 1)
-        rewards, shares = best_levels(expected, quiet, mode_rules, places, nominal, 0, power_step)
-        self._maps: dict[str, tuple[list[Values], list[Values], Reach, Tensor]] = {}
-        for mode_rule, reward, share in zip(mode_rules, rewards, shares, strict=True):
-            of_slots = [reward.reshape(self._grid.shape).numpy()] * num_slots
-            (reach,) = reaches_of(physics, mode_rule, resolution)
-            values = values_to_go(of_slots, reach)
-            self._maps[mode_rule] = of_slots, values, reach, share.reshape(self._grid.shape)
+        maps = best_levels(expected, quiet, self._rules, places, nominal, 0, power_step)
+        for mode_rule, reward, share in zip(self._rules, *maps, strict=True):
+            self._keep(mode_rule, reward, share)
+
+    def earn(self, reward: Reward, draws: int, seed: int) -> None:
+        """Let flights earn another reward, at the nominal power.
+
+        Args:
+            reward: what a slot earns.
+            draws: of a slot's fading and tasks that the expected reward is averaged over.
+            seed: of the draws.
+        """
+        scenario, places = self._physics.scenario, self._grid.positions()
+        by_flight = depends_on_velocity(reward, scenario)
+        speed = self._resolution / scenario.slot_duration
+        for mode_rule, reach in self._reaches.items():
+            velocities = torch.from_numpy(reach.displacements) * speed if by_flight else None
+            generator = torch.Generator().manual_seed(seed)
+            maps = reward_maps(
+                self._physics, places, draws, generator, reward, velocities, [mode_rule]
+            )
+            self._keep(mode_rule, maps[0], places.new_ones(len(places)))
+
+    def _keep(self, mode_rule: str, reward: Tensor, share: Tensor) -> None:
+        own = reward.reshape(*reward.shape[:-1], *self._grid.shape).numpy()
+        rewards = [own] * self._num_slots
+        values = values_to_go(rewards, self._reaches[mode_rule])
+        self._values[mode_rule] = rewards, values, share.reshape(self._grid.shape)
 
     def best(self, mode_rule: str, num_slots: int) -> tuple[Tensor, Tensor]:
         """A path (T + 1, 1, 2) m and powers (T, 1), in units of the nominal power."""
-        rewards, values, reach, share = self._maps[mode_rule]
+        rewards, values, share = self._values[mode_rule]
         # The reward has no clock, so the values of all horizons are those of the longest's end.
         grid, last = self._grid, slice(len(values) - num_slots, None)
-        flight = best_flight(rewards[last], values[last], reach, grid.start)
+        flight = best_flight(rewards[last], values[last], self._reaches[mode_rule], grid.start)
         rows, columns = flight[1:].T
         return grid.places(flight).unsqueeze(1), share[rows, columns].unsqueeze(1)
 

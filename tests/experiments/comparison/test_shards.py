@@ -93,7 +93,7 @@ def test_learners_are_set_beside_the_optimum(optima: Optima, tmp_path: Path) -> 
             for learner in range(4)
         ]
     )
-    results, curves = work.tables(metrics, [1.0, 2.0, 3.0, 4.0])
+    results, curves = work.tables(metrics, *([[1.0, 2.0, 3.0, 4.0]] * 2))
     assert results["scheme"].tolist() == ["relay", "relay", "hybrid", "hybrid"]
     assert results["seed"].tolist() == [3, 4, 3, 4]
     assert results["sum_rate"].tolist() == [1.0, 2.0, 3.0, 4.0]

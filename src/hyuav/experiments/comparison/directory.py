@@ -12,6 +12,7 @@ from omegaconf import OmegaConf
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.files import create_durably, require_writable
 from hyuav._support.yaml_files import read_yaml
+from hyuav.envs.rewards import REWARDS, SUM_RATE
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import PLAIN, Compare, parameters_of, training_episodes
 from hyuav.experiments.comparison.shards import Shard
@@ -22,7 +23,8 @@ from hyuav.experiments.run_directory import RunConfiguration
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.learning.training import TrainingParameters
-from hyuav.references.optimum import require_resolution
+from hyuav.references.objectives import why_no_optimum
+from hyuav.references.optimum import usable_resolution
 
 WORKING = ("workers", "engine", "address", "retries", "output", "logger", "training.cohorts")
 """Entries of the configuration that change how the work is done and not what comes of it."""
@@ -53,9 +55,12 @@ class ComparisonDirectory:
         self._logger = LoggerParameters.from_dict(config["logger"])
         training_episodes(self._training)
         scenarios = options.scenarios()
+        reward, longest = REWARDS.find(options.reward), max(options.num_slots)
         for scenario in scenarios.values():
-            resolution, longest = self._evaluation.resolution, max(options.num_slots)
-            require_resolution(resolution, scenario.map_side, longest)
+            if (reason := why_no_optimum(reward, scenario)) is not None:
+                accepted = f"one with an optimum to compare with ({reason})"
+                raise InputError(rejection("reward", reward.name, accepted))
+            usable_resolution(self._evaluation.resolution, scenario, longest, reward)
         if options.workers > 1 or options.engine == "ray":
             self._training = dataclasses.replace(self._training, cohorts=1)
         self._begin(config)
@@ -65,6 +70,7 @@ class ComparisonDirectory:
                 options.num_slots,
                 self._evaluation.resolution,
                 path / "optima" / f"{name}.parquet",
+                reward,
             )
             for name, scenario in scenarios.items()
         }
@@ -105,7 +111,7 @@ class ComparisonDirectory:
             for entry in self.options.entries
             if (name := entry.partition("-")[0]) != PEER
         }
-        return _entries({"shard_learners": Compare.shard_learners, **plain})
+        return _entries({"shard_learners": Compare.shard_learners, "reward": SUM_RATE, **plain})
 
     def _shard(self, entry: str, name: str, num_slots: int, part: range) -> Shard:
         learners = self.options.members
@@ -116,6 +122,7 @@ class ComparisonDirectory:
             entry.partition("-")[0],
             parameters_of(entry),
             self._training,
+            self.optima[name].reward,
         )
         return Shard(
             entry,

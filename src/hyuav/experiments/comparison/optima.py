@@ -9,6 +9,8 @@ import torch
 
 from hyuav._support.errors import InputError
 from hyuav._support.files import read_parquet, write_durably
+from hyuav.envs.reward import Reward
+from hyuav.envs.rewards import DEFAULT
 from hyuav.experiments.schemes import OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.references.flight import FlightPolicy
@@ -20,15 +22,17 @@ class Optima:
     """The best flight of each mode rule over each horizon, in a Parquet file.
 
     It has a row for each slot from 0: ``scheme`` (the mode rule), ``num_slots``, ``value`` and
-    ``standard_error`` of the flight in bps/Hz, ``slot``, and ``x`` and ``y`` in m.
+    ``standard_error`` of the flight, ``slot``, and ``x`` and ``y`` in m.
     """
 
     scenario: Scenario
     """Whose ``num_slots`` is not used."""
     horizons: tuple[int, ...]
-    resolution: float
-    """Of the grid in m."""
+    resolution: float | None
+    """Of the grid in m; None for the default."""
     file: Path
+    reward: Reward = DEFAULT
+    """Of which they are the best."""
 
     @property
     def is_solved(self) -> bool:
@@ -43,7 +47,9 @@ class Optima:
 
     def solve(self) -> None:
         """Find the flights and write the file."""
-        found = solve_horizons(self.scenario, self.horizons, resolution=self.resolution)
+        found = solve_horizons(
+            self.scenario, self.horizons, resolution=self.resolution, reward=self.reward
+        )
         flights = [
             pd.DataFrame(
                 {

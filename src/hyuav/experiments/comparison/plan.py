@@ -23,6 +23,8 @@ from hyuav._support.parameters import (
     ZeroOrMore,
     parameter,
 )
+from hyuav._support.registry import is_reference
+from hyuav.envs.rewards import REWARDS, SUM_RATE
 from hyuav.experiments.comparison.ray import LOCAL
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.experiments.scenarios import NAMES, named_scenario
@@ -30,7 +32,7 @@ from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.parameters import OFF
 from hyuav.learning.guide.robust import Robust
-from hyuav.learning.registry import ALGORITHMS, PEER, find, is_reference, names
+from hyuav.learning.registry import ALGORITHMS, PEER
 from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
@@ -89,6 +91,8 @@ class Compare(Parameters):
     learners: Annotated[int, Field(ge=1, le=100_000)] = parameter(10)
     """Of each algorithm, scenario, mode rule and horizon; their seeds follow ``seed``."""
     seed: CountOrZero = parameter(0)
+    reward: Text = parameter(SUM_RATE)
+    """What a slot earns: a name, or FILE.py:NAME of a function that adds up over slots."""
     threshold: Fraction = parameter(0.97)
     """Share of the optimum that counts as solved."""
     shard_learners: Count = parameter(60)
@@ -106,11 +110,12 @@ class Compare(Parameters):
     """Directory of the comparison, which may have been begun."""
 
     def __post_init__(self) -> None:
+        REWARDS.find(self.reward)
         for index, name in enumerate(self.algorithm):
             if is_reference(name):
-                find(name)
+                ALGORITHMS.find(name)
             place = f"algorithm[{index}]" if len(self.algorithm) > 1 else "algorithm"
-            require_choice(place, name, [*names(), PEER])
+            require_choice(place, name, [*ALGORITHMS.names(), PEER])
         for name in ("algorithm", "without", "scheme", "num_slots"):
             values = getattr(self, name)
             if len(set(values)) < len(values):

@@ -13,6 +13,8 @@ from rich.console import Console
 
 from hyuav._support.errors import BusyError, Halted, InputError, rejection
 from hyuav._support.files import read_parquet, rename_durably, write_durably
+from hyuav._support.registry import file_name
+from hyuav.envs.rewards import DEFAULT
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import training_episodes
 from hyuav.experiments.evaluation import EvaluationParameters, fly
@@ -22,7 +24,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LEARNED, OPTIMA
 from hyuav.experiments.tracking import LoggerParameters, in_group
 from hyuav.experiments.train import resume, train
-from hyuav.learning.registry import PEER, file_name
+from hyuav.learning.registry import PEER
 
 TABLES = RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
 
@@ -113,8 +115,10 @@ class Shard:
         for checkpoint in (finished.previous_checkpoint, finished.last_checkpoint):
             checkpoint.unlink(missing_ok=True)  # nothing goes on from them any more
 
-    def _keep(self, directory: Path, metrics: pd.DataFrame, sum_rates: list[float]) -> None:
-        for name, table in zip(TABLES, self.tables(metrics, sum_rates), strict=True):
+    def _keep(
+        self, directory: Path, metrics: pd.DataFrame, sum_rates: list[float], earned: list[float]
+    ) -> None:
+        for name, table in zip(TABLES, self.tables(metrics, sum_rates, earned), strict=True):
             write_durably(directory / name, table.to_parquet())
 
     def _train(self, directory: Path) -> None:
@@ -174,22 +178,27 @@ class Shard:
             and not evaluated[[*METRIC_NUMBERS]].isna().to_numpy().any()
         )
 
-    def _reached(self, run: RunDirectory) -> tuple[pd.DataFrame, list[float]]:
-        """A training's metrics, and the best actors' sum-rates in bps/Hz."""
+    def _reached(self, run: RunDirectory) -> tuple[pd.DataFrame, list[float], list[float]]:
+        """A training's metrics, the best actors' sum-rates in bps/Hz, and what they earn."""
         learners, scenario = self.configuration.learners, self.configuration.scenario
         metrics = run.metrics()
         metrics["seconds"] /= len(learners)
-        earned: dict[str, list[float]] = {
-            scheme: fly(scenario, scheme, policy, self.evaluation)
-            .totals["secrecy_sum_rate"]
-            .mean(dim=1)
-            .tolist()
-            for scheme, (policy,) in learned_policies([run], scenario).items()
-        }
-        return metrics, [earned[LEARNED[own.scheme]].pop(0) for own in learners]
+        reward = self.configuration.reward
+        sum_rates: dict[str, list[float]] = {}
+        earned: dict[str, list[float]] = {}
+        for scheme, (policy,) in learned_policies([run], scenario).items():
+            flights = fly(scenario, scheme, policy, self.evaluation, reward=reward)
+            sum_rates[scheme] = flights.totals["secrecy_sum_rate"].mean(dim=1).tolist()
+            earned[scheme] = flights.earned.mean(dim=1).tolist()
+        order = [LEARNED[own.scheme] for own in learners]
+        return (
+            metrics,
+            [sum_rates[scheme].pop(0) for scheme in order],
+            [earned[scheme].pop(0) for scheme in order],
+        )
 
     def tables(
-        self, metrics: pd.DataFrame, sum_rates: list[float]
+        self, metrics: pd.DataFrame, sum_rates: list[float], earned: list[float]
     ) -> tuple[pd.DataFrame, pd.DataFrame]:
         """What the learners reached, and how.
 
@@ -199,16 +208,18 @@ class Shard:
                 its ``sum_rate`` in bps/Hz, and ``seconds``, those that passed since training
                 began, with compiling and evaluating, divided by the learners that trained side by
                 side. A learner has rows until it stops.
-            sum_rates: in bps/Hz, what each learner's best weights earn in the evaluation's
+            sum_rates: in bps/Hz, what each learner's best weights bring in the evaluation's
                 episodes.
+            earned: and what they earn there by the reward.
 
         Returns:
-            ``results``, a row for each learner: ``sum_rate``, the ``optimum`` of its mode rule in
-            the same episodes, and their ratio ``fraction``; ``episodes_to_threshold`` and
-            ``seconds_to_threshold`` at the first evaluation at which the best weights so far
-            earned the threshold's share of what the optimum earns in that evaluation's episodes,
-            NaN where none did; ``seconds`` in all; and ``stopped``, the episode in which the
-            learner stopped for want of finite numbers, NaN for those that did not.
+            ``results``, a row for each learner: ``sum_rate``, what it ``earned``, the ``optimum``
+            of its mode rule in the same episodes, and the ratio of both, ``fraction``;
+            ``episodes_to_threshold`` and ``seconds_to_threshold`` at the first evaluation at which
+            the best weights so far earned the threshold's share of what the optimum earns in that
+            evaluation's episodes, NaN where none did; ``seconds`` in all; and ``stopped``, the
+            episode in which the learner stopped for want of finite numbers, NaN for those that did
+            not.
             ``curves``, a row for each evaluation, with ``best_sum_rate``, what the best weights so
             far earned, and its ``fraction`` of the optimum in the same episodes.
         """
@@ -226,14 +237,16 @@ class Shard:
             }
             own = metrics[metrics["learner"] == index]
             last = int(own["episode"].iloc[-1]) if len(own) else 0
-            curve = _curve(own, in_training[learner.scheme])
-            sum_rate, optimum = sum_rates[index], in_evaluation[learner.scheme]
+            by = "sum_rate" if self.configuration.reward == DEFAULT else "evaluation"
+            curve = _curve(own, in_training[learner.scheme], by)
+            optimum = in_evaluation[learner.scheme]
             results.append(
                 {
                     **identity,
-                    "sum_rate": sum_rate,
+                    "sum_rate": sum_rates[index],
+                    "earned": earned[index],
                     "optimum": optimum,
-                    "fraction": sum_rate / optimum,
+                    "fraction": earned[index] / optimum,
                     **_first_solved(curve, self.threshold),
                     "seconds": own["seconds"].iloc[-1] if len(own) else 0.0,
                     "stopped": last + 1.0 if last < episodes else np.nan,
@@ -243,7 +256,7 @@ class Shard:
         return pd.DataFrame(results), pd.concat(curves, ignore_index=True)
 
     def _optima(self, episodes: EvaluationParameters) -> Mapping[str, float]:
-        """What the best flight of each learner's mode rule earns in these episodes, in bps/Hz.
+        """What the best flight of each learner's mode rule earns in these episodes.
 
         Raises:
             InputError: one earns nothing, so that no fraction of it can be told.
@@ -251,21 +264,28 @@ class Shard:
         scenario, optima = self.configuration.scenario, {}
         for rule in dict.fromkeys(own.scheme for own in self.configuration.learners):
             policy = self.optima.policy(rule, scenario.num_slots)
-            flights = fly(scenario, OPTIMA[rule], policy, episodes)
-            optima[rule] = float(flights.totals["secrecy_sum_rate"].mean())
+            reward = self.configuration.reward
+            flights = fly(scenario, OPTIMA[rule], policy, episodes, reward=reward)
+            optima[rule] = float(flights.earned.mean())
             if not optima[rule]:
                 accepted = f"one whose optimum earns something (T = {scenario.num_slots})"
                 raise InputError(rejection("scheme", rule, accepted))
         return optima
 
 
-def _curve(metrics: pd.DataFrame, optimum: float) -> pd.DataFrame:
-    """The evaluations of one learner, with what the best weights so far earned."""
+def _curve(metrics: pd.DataFrame, optimum: float, by: str) -> pd.DataFrame:
+    """The evaluations of one learner, with what the best weights so far brought.
+
+    Args:
+        metrics: of the learner.
+        optimum: what the best flight earns.
+        by: the column that is set beside it.
+    """
     columns = ["episode", "slots", "seconds", "evaluation", "sum_rate"]
     curve = metrics[columns].dropna(subset="evaluation").reset_index(drop=True)
     is_best = curve["evaluation"] > curve["evaluation"].cummax().shift(fill_value=-np.inf)
     curve["best_sum_rate"] = curve["sum_rate"].where(is_best).ffill()
-    curve["fraction"] = curve["best_sum_rate"] / optimum
+    curve["fraction"] = curve[by].where(is_best).ffill() / optimum
     return curve
 
 

@@ -3,7 +3,7 @@
 import copy
 import math
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import pandas as pd
@@ -21,7 +21,7 @@ from hyuav.physics.scenario import Scenario
 
 def train(
     configuration: RunConfiguration, evaluation: EvaluationParameters
-) -> tuple[pd.DataFrame, list[float]]:
+) -> tuple[pd.DataFrame, list[float], list[float]]:
     """Train the learners one after another, with the paper's hyperparameters.
 
     They are evaluated as this project's own are, after as many episodes and in the same ones.
@@ -31,20 +31,21 @@ def train(
         evaluation: of each learner's best weights.
 
     Returns:
-        a row for each evaluation and learner, as :meth:`.shards.Shard.tables` takes them, and what
-        each learner's best weights earn in bps/Hz.
+        a row for each evaluation and learner, as :meth:`.shards.Shard.tables` takes them, the
+        sum-rate of each learner's best weights in bps/Hz, and what they earn.
     """
-    rows, sum_rates = [], []
+    rows, sum_rates, earned = [], [], []
     for index, learner in enumerate(configuration.learners):
-        own, sum_rate = _train(configuration, learner, evaluation)
+        own, best = _train(configuration, learner, evaluation)
         rows += [{"learner": index, **row} for row in own]
-        sum_rates.append(sum_rate)
-    return pd.DataFrame(rows), sum_rates
+        sum_rates.append(best.sum_rate)
+        earned.append(best.earned)
+    return pd.DataFrame(rows), sum_rates, earned
 
 
 def _train(
     configuration: RunConfiguration, learner: Learner, evaluation: EvaluationParameters
-) -> tuple[list[dict[str, Any]], float]:
+) -> tuple[list[dict[str, Any]], "Brought"]:
     started, scenario, training = (
         time.perf_counter(),
         configuration.scenario,
@@ -54,6 +55,7 @@ def _train(
         "hyuav/SecureOffloading-v0",
         scenario=scenario,
         scheme=learner.scheme,
+        reward=configuration.reward,
         disable_env_checker=True,
     )
     model = ddpg_model(
@@ -72,27 +74,40 @@ def _train(
         slots = episodes * scenario.num_slots
         model.learn(slots, reset_num_timesteps=False, log_interval=None)
         episode += episodes
-        sum_rate, reward = _earned(policy, training_episodes(training))
-        if reward > best:
-            best, best_weights = reward, copy.deepcopy(policy.state_dict())
+        brought = _flown(configuration, policy, training_episodes(training))
+        if brought.reward > best:
+            best, best_weights = brought.reward, copy.deepcopy(policy.state_dict())
         rows.append(
             {
                 "episode": episode,
                 "slots": episode * scenario.num_slots,
                 "seconds": time.perf_counter() - started,
-                "evaluation": reward,
-                "sum_rate": sum_rate,
+                "evaluation": brought.reward,
+                "sum_rate": brought.sum_rate,
             }
         )
     policy.load_state_dict(best_weights)
-    return rows, _earned(policy, evaluation)[0]
+    return rows, _flown(configuration, policy, evaluation)
 
 
-def _earned(policy: Policy, episodes: EvaluationParameters) -> tuple[float, float]:
-    """Means over the episodes in bps/Hz: the secrecy sum-rate, and the reward with penalties."""
+class Brought(NamedTuple):
+    """Means over episodes."""
+
+    sum_rate: float
+    """bps/Hz."""
+    earned: float
+    """By the reward."""
+    reward: float
+    """The same with penalties."""
+
+
+def _flown(
+    configuration: RunConfiguration, policy: Policy, episodes: EvaluationParameters
+) -> Brought:
+    """What an actor brings in these episodes."""
     scenario: Scenario = policy.environment["scenario"]
     scheme = LEARNED[policy.environment["scheme"]]
-    totals = fly(scenario, scheme, policy, episodes).totals
-    sum_rate = totals["secrecy_sum_rate"]
-    reward = sum_rate - scenario.off_map_penalty * totals["off_map"]
-    return float(sum_rate.mean()), float(reward.mean())
+    flights = fly(scenario, scheme, policy, episodes, reward=configuration.reward)
+    penalized = flights.earned - scenario.off_map_penalty * flights.totals["off_map"]
+    means = flights.totals["secrecy_sum_rate"], flights.earned, penalized
+    return Brought(*(float(each.mean()) for each in means))

@@ -8,11 +8,12 @@ from rich.table import Table
 
 from hyuav._support.errors import harmless
 from hyuav._support.formatting import interval, or_never, percent
+from hyuav._support.registry import is_reference
 from hyuav._support.terminal import print_line, print_table, results_table
 from hyuav.experiments.comparison.statistics import NEAR_OPTIMAL
 from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.metrics import finite_numbers
-from hyuav.learning.registry import PEER, is_reference
+from hyuav.learning.registry import PEER
 
 LABEL_WIDTH = 14
 """Of the column of the algorithms; longer names go on in the next line."""

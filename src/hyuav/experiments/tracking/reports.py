@@ -141,15 +141,20 @@ def _scheme_table(schemes: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
             "low": rate["ci95"][0],
             "high": rate["ci95"][1],
         }
-        rows.append(own | {name: value for name, value in result.items() if name not in own})
+        more = {name: value for name, value in result.items() if name not in own}
+        if "reward" in more:
+            more["reward"] = more["reward"]["mean"]
+        rows.append(own | more)
     return pd.DataFrame(rows)
 
 
 def _results(schemes: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
-    """Each scheme's mean secrecy sum-rate in bps/Hz and its fraction of the optimum."""
+    """Of each scheme: mean secrecy sum-rate in bps/Hz, mean reward, fraction of the optimum."""
     values = {}
     for scheme, result in schemes.items():
         values[f"{scheme}/secrecy_sum_rate"] = result["secrecy_sum_rate"]["mean"]
+        if "reward" in result:
+            values[f"{scheme}/reward"] = result["reward"]["mean"]
         if "fraction_of_optimum" in result:
             values[f"{scheme}/fraction_of_optimum"] = result["fraction_of_optimum"]
     return values

@@ -98,7 +98,10 @@ class Tracker:
             console,
         )
         self._progress = TrainingProgress(
-            console, training.parameters.num_episodes, training.episode
+            console,
+            training.parameters.num_episodes,
+            training.episode,
+            configuration.reward.unit,
         )
         self._started = time.perf_counter() - reported.seconds
         self._saved = time.perf_counter()

@@ -11,6 +11,7 @@ from torchrl.envs import TransformedEnv
 
 from hyuav._support.randomness import RowStream, standard_normal
 from hyuav.envs.observation import ObservationLayout
+from hyuav.envs.reward import POSITION
 from hyuav.learning.algorithm import (
     Algorithm,
     AlgorithmParameters,
@@ -32,7 +33,8 @@ class Planner(Guidance):
     """Keep the flights of which most is to be expected, among those flown and those imagined.
 
     After an episode all flights are judged anew by the reward model, where there is a control
-    variate; otherwise a flight counts what it earned.
+    variate and the reward of a slot depends on where the helper is alone. Otherwise a flight counts
+    what it earned, less what is known to be chance.
 
     Args:
         guide: its parameters.
@@ -55,6 +57,8 @@ class Planner(Guidance):
         self._layout = ObservationLayout(self._scenario, clock=algorithm.clock)
         self.flights = Demonstrations(learners, self._scenario, guide.return_margin)
         self.reward_model = self._make_reward_model() if guide.control_variate else None
+        by_place = env.base_env.reward.depends_on == POSITION
+        self._judging = self.reward_model if by_place else None
         if self.reward_model is not None:
             draw_weights(self.reward_model, seeds, "control variate")
         physics, schemes = env.base_env.physics, env.base_env.schemes
@@ -75,8 +79,8 @@ class Planner(Guidance):
     def _random_streams(self) -> dict[str, RowStream]:
         """``guesses`` (N, F) and ``variations`` (N, D, 5), as far as they are needed."""
         shapes: dict[str, tuple[int, ...]] = {}
-        if self.reward_model is not None and self.guide.keeps_flights:
-            shapes["guesses"] = (self.reward_model.size,)
+        if self._judging is not None and self.guide.keeps_flights:
+            shapes["guesses"] = (self._judging.size,)
         if self.guide.imagined_flights:
             shapes["variations"] = self._proposals.normals
         return {
@@ -134,12 +138,17 @@ class Planner(Guidance):
         """
         if not self.guide.keeps_flights:
             return
-        if self.reward_model is not None:
-            self._judge(self.reward_model, episode, flown, stored)
+        if self._judging is not None:
+            self._judge(self._judging, episode, flown, stored)
             return
         trajectory = self._layout.position(flown["next", "observation"])
-        self.flights.keep(flown["action"], trajectory, flown["next", "reward"].sum(dim=(0, 2)))
+        earned = flown["next", "reward"] - self._control_terms(flown)
+        self.flights.keep(flown["action"], trajectory, earned.sum(dim=(0, 2)))
         self.flights.plan_best()
+
+    def _control_terms(self, flown: TensorDictBase) -> Tensor:
+        """What of each slot's reward is known to be chance: (T, N, 1), of slots (T, N)."""
+        return self.control_term(flown.transpose(0, 1)).transpose(0, 1)
 
     def _judge(
         self, model: RewardModel, episode: int, flown: TensorDictBase, stored: TensorDictBase

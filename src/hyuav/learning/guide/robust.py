@@ -9,7 +9,9 @@ from dataclasses import replace
 from pydantic.dataclasses import dataclass
 from torchrl.envs import TransformedEnv
 
+from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import Fraction, PositiveNumber, parameter
+from hyuav.envs.reward import POSITION, Reward
 from hyuav.learning.algorithm import ActionScale, Algorithm, AlgorithmParameters
 from hyuav.learning.ddpg import DDPG, NoiseVariance, SlotOrEpisode
 from hyuav.learning.guide.parameters import Guide
@@ -49,6 +51,14 @@ class Robust(AlgorithmParameters):
         if self.guide is None:
             return algorithm
         return Planner(self.guide, self, env, seeds).attach(algorithm)
+
+    def require_suited(self, reward: Reward) -> None:
+        """See :meth:`AlgorithmParameters.require_suited`; flights are imagined by places alone."""
+        super().require_suited(reward)
+        imagined = 0 if self.guide is None else self.guide.imagined_flights
+        if imagined and reward.depends_on != POSITION:
+            accepted = f"0, because reward = {reward.name} depends on more than the place"
+            raise InputError(rejection("algorithm.guide.imagined_flights", imagined, accepted))
 
     def least_replay(self, num_slots: int) -> int:
         """See :meth:`AlgorithmParameters.least_replay`: a flight, to keep the best."""

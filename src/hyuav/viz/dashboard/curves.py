@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 
 from hyuav.experiments.schemes import LABELS, OPTIMA
 from hyuav.viz.data.curves import (
+    BPS,
     NOISY,
     RETURNS,
     SMOOTHING,
@@ -67,7 +68,10 @@ class Choice:
 
 
 def comparison(
-    metrics: Mapping[str, pd.DataFrame], optima: Mapping[str, Mapping[str, float]], choice: Choice
+    metrics: Mapping[str, pd.DataFrame],
+    optima: Mapping[str, Mapping[str, float]],
+    choice: Choice,
+    unit: str = BPS,
 ) -> go.Figure:
     """The curves of several runs: a thin line for each learner, and their mean.
 
@@ -77,8 +81,9 @@ def comparison(
 
     Args:
         metrics: by the run's name.
-        optima: of the runs for which they are known, by mode rule, in bps/Hz.
+        optima: of the runs for which they are known, by mode rule.
         choice: what is drawn.
+        unit: of the rewards.
     """
     figure, several_runs = go.Figure(), len(metrics) > 1
     for place, (run, rows) in enumerate(metrics.items()):
@@ -104,7 +109,7 @@ def comparison(
     figure.update_layout(
         **base_layout(),
         xaxis=axis(X_AXES[choice.x], rangemode="tozero"),
-        yaxis=axis(quantities(metrics).get(choice.y, choice.y)),
+        yaxis=axis(plain(quantities(metrics, unit).get(choice.y, choice.y))),
         height=min(460 + 20 * max(len(named) - 4, 0), 760),  # a legend takes up to half of it
         margin={"l": 8, "r": 24, "t": 12, "b": 8},
         showlegend=True,

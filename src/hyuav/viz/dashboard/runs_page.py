@@ -30,7 +30,7 @@ _ROW, _TABLE = 35, 290
 _LETTER = 6.5
 """Width in pixels of a table's letters."""
 
-_BEST, _BEGUN = "Best return (bps/Hz)", "Begun (UTC)"
+_BEST, _BEGUN = "Best return", "Begun (UTC)"
 """Columns of the list that are not shown as they are."""
 
 
@@ -64,7 +64,8 @@ def _page(index: RunIndex) -> None:
         for entry in chosen:
             _progress(entry, now)
     if metrics:
-        _drawn(index, metrics)
+        units = {entry.unit for entry in chosen}
+        _drawn(index, metrics, units.pop() if len(units) == 1 else "")
 
 
 def _filtered(entries: Sequence[RunEntry], now: float) -> list[RunEntry]:
@@ -105,6 +106,7 @@ def _listing(entries: Sequence[RunEntry], now: float) -> pd.DataFrame:
             "State": [entry.state(now) for entry in entries],
             "Episode": [_episodes(entry) for entry in entries],
             _BEST: [entry.best for entry in entries],
+            "Of": [entry.unit or "-" for entry in entries],
             "Scenario": [entry.scenario for entry in entries],
             "Algorithm": [entry.algorithm for entry in entries],
             "Mode chosen by": [", ".join(entry.schemes) for entry in entries],
@@ -173,20 +175,20 @@ def _progress(entry: RunEntry, now: float) -> None:
         st.progress(share, f"{plain(entry.name)}: episode {_episodes(entry)}")
 
 
-def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame]) -> None:
+def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame], unit: str) -> None:
     """The figure with its controls, and the tables below it."""
-    choice = _choice(metrics)
+    choice = _choice(metrics, unit)
     optima: dict[str, Mapping[str, float]] = {}
     with st.container():
         for name in metrics:
             with refusals():
                 optima[name] = index.optima(name)
-    figure = _figure(metrics, optima, choice)
+    figure = _figure(metrics, optima, choice, unit)
     if not figure.data:
         st.info("No episode of this quantity is complete yet.")
         return
     st.plotly_chart(figure, key="curves", theme=None, config={"displaylogo": False})
-    reached = last_results(metrics, choice.y)
+    reached = last_results(metrics, choice.y, unit)
     st.dataframe(reached, hide_index=True, column_config={"Run": _name_column(metrics)})
     if len(metrics) > 1:
         st.subheader("What sets these runs apart", anchor=False)
@@ -210,22 +212,25 @@ class _Shown(NamedTuple):
 
 
 def _figure(
-    metrics: Mapping[str, pd.DataFrame], optima: Mapping[str, Mapping[str, float]], choice: Choice
+    metrics: Mapping[str, pd.DataFrame],
+    optima: Mapping[str, Mapping[str, float]],
+    choice: Choice,
+    unit: str,
 ) -> go.Figure:
     """The figure, made anew only where something has changed.
 
     Metrics without new rows are the same table as before.
     """
     shown: _Shown | None = st.session_state.get("shown")
-    made_of = optima, choice, [(name, id(rows)) for name, rows in metrics.items()]
+    made_of = optima, choice, unit, [(name, id(rows)) for name, rows in metrics.items()]
     if shown is None or shown.made_of != made_of:
-        shown = _Shown(comparison(metrics, optima, choice), metrics, made_of)
+        shown = _Shown(comparison(metrics, optima, choice, unit), metrics, made_of)
         st.session_state["shown"] = shown
     return shown.figure
 
 
-def _choice(metrics: Mapping[str, pd.DataFrame]) -> Choice:
-    names = quantities(metrics)
+def _choice(metrics: Mapping[str, pd.DataFrame], unit: str) -> Choice:
+    names = quantities(metrics, unit)
     what, against, smoothing, colors = st.columns([3, 3, 3, 2])
     if st.session_state.get("quantity") not in names:
         st.session_state["quantity"] = next(iter(names), None)

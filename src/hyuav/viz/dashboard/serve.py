@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import Count, Parameters, Text, ZeroOrMore, parameter
-from hyuav.experiments.own_algorithms import OwnAlgorithm
+from hyuav.experiments.own_code import OwnAlgorithm, OwnReward
 
 APP = Path(__file__).with_name("app.py")
 
@@ -25,6 +25,8 @@ class Dashboard(Parameters):
     """The directory of the runs; it may be filled later."""
     algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
     """Their own algorithms; a run's directory names a file, but only you let it be run."""
+    reward: ZeroOrMore[OwnReward] = parameter(())
+    """Their own rewards, for the same reason."""
     port: Count = parameter(8501)
     address: Text = parameter("127.0.0.1")
     """Of the network interface to be reached by; the default is this machine alone."""

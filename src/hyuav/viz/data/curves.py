@@ -21,12 +21,15 @@ NOISY = "accumulated_reward"
 """The quantity that is drawn smoothed; the others are means over evaluation episodes."""
 
 RETURNS = {
-    NOISY: "Accumulated reward (bps/Hz)",
-    "evaluation": "Noise-free return (bps/Hz)",
-    "sum_rate": "Noise-free secrecy sum-rate (bps/Hz)",
-    "best_evaluation": "Best noise-free return so far (bps/Hz)",
+    NOISY: "Accumulated reward",
+    "evaluation": "Noise-free return",
+    "sum_rate": "Noise-free secrecy sum-rate",
+    "best_evaluation": "Best noise-free return so far",
 }
-"""Columns of the metrics that the optimum bounds, with the title of their axis."""
+"""Columns of the metrics that the optimum bounds, and what they are."""
+
+BPS = "bps/Hz"
+"""Unit of what is earned by default."""
 
 LAST_EPISODES = 50
 """Over which what a run reached last is averaged."""
@@ -74,6 +77,22 @@ class LearningCurve(NamedTuple):
         return interquartile_band(self.learners.to_numpy(dtype=float))
 
 
+def in_brackets(quantity: str, unit: str) -> str:
+    """The unit of a quantity as it stands behind a word; empty where there is none.
+
+    Args:
+        quantity: a column of the metrics.
+        unit: of the reward.
+    """
+    unit = BPS if quantity == "sum_rate" else unit if quantity in RETURNS else ""
+    return f" ({unit})" if unit else ""
+
+
+def axis_title(quantity: str, unit: str) -> str:
+    """Of a quantity of :data:`RETURNS`, where rewards have this unit."""
+    return f"{RETURNS[quantity]}{in_brackets(quantity, unit)}"
+
+
 def learning_curves(
     metrics: pd.DataFrame, quantity: str = NOISY, against: str = "episode"
 ) -> Iterator[LearningCurve]:
@@ -104,11 +123,11 @@ def learning_table(
 
     Args:
         curves: one for each scheme.
-        optima: by mode rule, what the best flight earns on average, in bps/Hz.
+        optima: by mode rule, what the best flight earns on average.
         training: what the training is called.
 
     Returns:
-        ``training``, ``scheme``, ``episode``, ``learners``; in bps/Hz the ``iqm`` of the
+        ``training``, ``scheme``, ``episode``, ``learners``; the ``iqm`` of the
         rewards, each averaged over :data:`SMOOTHING` episodes, its 95 % bootstrap interval
         ``low`` to ``high``, and the ``optimum``, NaN where it is not known.
     """
@@ -148,22 +167,30 @@ def extremes(x: Values, y: Values, points: int) -> tuple[Values, Values]:
     return x[kept], y[kept]
 
 
-def quantities(metrics: Mapping[str, pd.DataFrame]) -> dict[str, str]:
-    """What can be drawn of these runs, with the axis titles; the losses come last."""
+def quantities(metrics: Mapping[str, pd.DataFrame], unit: str = BPS) -> dict[str, str]:
+    """What can be drawn of these runs, with the axis titles; the losses come last.
+
+    Args:
+        metrics: by the run's name.
+        unit: of their rewards.
+    """
     names = dict.fromkeys(name for rows in metrics.values() for name in rows.columns)
     losses = sorted(name for name in names if name.startswith("loss_"))
-    known = {name: title for name, title in RETURNS.items() if name in names}
+    known = {name: axis_title(name, unit) for name in RETURNS if name in names}
     return known | {name: f"Loss of the {name.removeprefix('loss_')}" for name in losses}
 
 
-def last_results(metrics: Mapping[str, pd.DataFrame], quantity: str) -> pd.DataFrame:
+def last_results(
+    metrics: Mapping[str, pd.DataFrame], quantity: str, unit: str = BPS
+) -> pd.DataFrame:
     """What each run's learners brought in the end, a row per run, scheme and horizon.
 
     Args:
         metrics: by the run's name.
         quantity: the column that is told of.
+        unit: of their rewards.
     """
-    unit = " (bps/Hz)" if quantity in RETURNS else ""
+    unit = in_brackets(quantity, unit)
     rows = []
     for run, table in metrics.items():
         for curve in learning_curves(table, quantity):

@@ -169,10 +169,11 @@ def fly_now(run: RunDirectory, name: str) -> tuple[Scenario, Evaluation]:
     Raises:
         InputError: the weights cannot be read, or do not fit.
     """
-    scenario = run.configuration().trained_scenario
+    configuration = run.configuration()
+    scenario = configuration.trained_scenario
     policies = learned_policies([run], scenario)
     policies |= straight_policies(scenario)[0]
-    return scenario, evaluate(scenario, name, policies, QUICK)
+    return scenario, evaluate(scenario, name, policies, QUICK, reward=configuration.reward)
 
 
 def fly_first_learner(run: RunDirectory, configuration: RunConfiguration) -> tuple[str, Evaluation]:
@@ -192,4 +193,5 @@ def fly_first_learner(run: RunDirectory, configuration: RunConfiguration) -> tup
     policies = learned_policies([run], scenario)
     scheme = next(scheme for scheme in LABELS if scheme in policies)
     own = {scheme: policies[scheme]}
-    return scheme, evaluate(scenario, configuration.scenario_name, own, _FEW)
+    name, reward = configuration.scenario_name, configuration.reward
+    return scheme, evaluate(scenario, name, own, _FEW, reward=reward)

@@ -14,7 +14,7 @@ from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.experiments.metrics import GrowingMetrics, last_metrics
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.viz.data.reading import optima_of, read_evaluation, readable_config
+from hyuav.viz.data.reading import optima_of, read_evaluation, readable_config, unit_of
 
 RUNNING_SECONDS = 120.0
 """A training that wrote nothing for longer counts as stopped."""
@@ -58,7 +58,9 @@ class RunEntry:
     num_episodes: int | None
     """How many are to come in all; None where the configuration does not say."""
     best: float | None
-    """Highest noise-free return of a learner so far in bps/Hz."""
+    """Highest noise-free return of a learner so far."""
+    unit: str
+    """Of returns; empty where it is not known."""
     begun: float
     """When the training began, in seconds since the epoch."""
     changed: float
@@ -186,7 +188,7 @@ class RunIndex:
         return read_evaluation(self.file(name, EVALUATION_FILE).parent)
 
     def optima(self, name: str) -> dict[str, float]:
-        """What the best flight earns in bps/Hz by mode rule, where it was evaluated.
+        """What the best flight earns by mode rule, where it was evaluated.
 
         Raises:
             InputError: as :meth:`evaluation`.
@@ -252,6 +254,7 @@ def _summarize(
         0 if rows.empty else int(rows["episode"].max()),
         planned if isinstance(planned, int) else None,
         None if pd.isna(best) else float(best),
+        unit_of(config),
         *written,
     )
 

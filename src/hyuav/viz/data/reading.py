@@ -12,6 +12,7 @@ import pandas as pd
 from hyuav._support.errors import InputError
 from hyuav._support.files import read_parquet
 from hyuav._support.yaml_files import read_yaml
+from hyuav.envs.rewards import REWARDS, SUM_RATE
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.experiments.schemes import LABELS, OPTIMA
 
@@ -60,7 +61,11 @@ def readable_evaluation(directory: Path) -> dict[str, Any] | None:
         return None
     try:
         content = json.loads((directory / EVALUATION_FILE).read_text(encoding="utf-8"))
-        complete = all(_is_account(account) for account in content["schemes"].values())
+        accounts = list(content["schemes"].values())
+        complete = all(_is_account(account) for account in accounts)
+        reward = content.get("reward")
+        told = reward is None or {"name", "unit"} <= set(reward)
+        complete = complete and told and all(("reward" in own) == bool(reward) for own in accounts)
         whole = all(type(content[name]) is int for name in ("num_slots", "episodes"))
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
@@ -70,9 +75,11 @@ def readable_evaluation(directory: Path) -> dict[str, Any] | None:
 def _is_account(account: dict[str, Any]) -> bool:
     if type(account["learners"]) is not int:
         return False
-    rate = account["secrecy_sum_rate"]
-    low, high = rate["ci95"]
-    needed = [rate["mean"], low, high, *(account[name] for name in _ACCOUNT)]
+    needed = [account[name] for name in _ACCOUNT]
+    for rate in (account["secrecy_sum_rate"], account.get("reward")):
+        if rate is not None:
+            low, high = rate["ci95"]
+            needed += [rate["mean"], low, high]
     optional = [account.get(f"fraction_of_{name}", 0.0) for name in ("optimum", "hybrid_optimum")]
     return all(
         isinstance(value, int | float) and abs(value) <= sys.float_info.max
@@ -80,11 +87,24 @@ def _is_account(account: dict[str, Any]) -> bool:
     )
 
 
+def earned(account: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What a scheme earned by the reward of its evaluation, with the interval."""
+    rate: Mapping[str, Any] = account.get("reward", account["secrecy_sum_rate"])
+    return rate
+
+
+def unit_of(config: Mapping[str, Any]) -> str:
+    """Of the reward that a configuration names; empty where that is not known here."""
+    name = config.get("reward", SUM_RATE)
+    known = REWARDS.get(name) if isinstance(name, str) else None
+    return "" if known is None else known.unit
+
+
 def optima_of(evaluation: Mapping[str, Any]) -> dict[str, float]:
-    """By mode rule, what the best flight earns in bps/Hz, where it was evaluated."""
+    """By mode rule, what the best flight earns by the reward, where it was evaluated."""
     results = evaluation["schemes"]
     return {
-        rule: float(results[optimum]["secrecy_sum_rate"]["mean"])
+        rule: float(earned(results[optimum])["mean"])
         for rule, optimum in OPTIMA.items()
         if optimum in results
     }

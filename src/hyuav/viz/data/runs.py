@@ -12,6 +12,7 @@ from hyuav._support.errors import InputError
 from hyuav.experiments.comparison.tables import label
 from hyuav.experiments.elsewhere import HORIZONS
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, Evaluation
+from hyuav.experiments.evaluation_table import earned_title
 from hyuav.experiments.metrics import readable_metrics
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.scenarios import named_scenario
@@ -19,6 +20,7 @@ from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import learning_curves, learning_table
 from hyuav.viz.data.reading import (
+    earned,
     is_drawable,
     optima_of,
     read_evaluation,
@@ -46,7 +48,9 @@ class FinishedRun:
 
     def __init__(self, run: RunDirectory) -> None:
         self.run = run
-        self.scenario: Scenario = run.configuration().trained_scenario
+        configuration = run.configuration()
+        self.scenario: Scenario = configuration.trained_scenario
+        self._unit = configuration.reward.unit
 
     @cached_property
     def flights(self) -> pd.DataFrame:
@@ -107,7 +111,9 @@ class FinishedRun:
                 tables.append(learning_table(curves, self._optima(), training))
         if not tables:
             raise InputError(f"no learner has the scenario's T = {self.scenario.num_slots}")
-        return pd.concat(tables, ignore_index=True)
+        table = pd.concat(tables, ignore_index=True)
+        table.attrs["unit"] = self._unit
+        return table
 
     def _trainings(self) -> dict[str, RunDirectory]:
         """By what they are called."""
@@ -136,15 +142,17 @@ def horizon_table(summaries: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
         summaries: of evaluations, as :attr:`Evaluation.summary`, one for each horizon.
 
     Returns:
-        ``scheme``, ``num_slots``, ``learners``, ``episodes``; in bps/Hz the ``mean`` of the secrecy
-        sum-rate and its 95 % interval ``low`` to ``high``.
+        ``scheme``, ``num_slots``, ``learners``, ``episodes``; the ``mean`` of what was earned, the
+        secrecy sum-rate or another reward, and its 95 % interval ``low`` to ``high``. Its ``attrs``
+        tell the ``title`` of what was earned.
     """
-    rows = []
+    rows, title = [], ""
     for summary in sorted(summaries, key=lambda summary: int(summary["num_slots"])):
+        title = earned_title(summary)
         for scheme in (*COMPARED, *OPTIMA.values()):
             if scheme in summary["schemes"]:
                 result = summary["schemes"][scheme]
-                rate = result["secrecy_sum_rate"]
+                rate = earned(result)
                 rows.append(
                     {
                         "scheme": scheme,
@@ -156,7 +164,9 @@ def horizon_table(summaries: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
                         "high": rate["ci95"][1],
                     }
                 )
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    table.attrs["title"] = title
+    return table
 
 
 def evaluations(directory: Path, scenario: Scenario | None) -> list[Evaluation]:

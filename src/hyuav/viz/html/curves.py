@@ -7,15 +7,22 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
-from hyuav.viz.data.curves import NOISY, RETURNS, SMOOTHING, LearningCurve, learning_curves
+from hyuav.viz.data.curves import (
+    BPS,
+    NOISY,
+    SMOOTHING,
+    LearningCurve,
+    axis_title,
+    learning_curves,
+)
 from hyuav.viz.data.schemes import GREY, mode_rule, scheme_color, scheme_label, scheme_line
 from hyuav.viz.html.style import DASHES, axis, base_layout, legend_below, plain, translucent
 
 MAX_POINTS = 300
 """Of a curve; neighbouring episodes are averaged where there are more."""
 
-QUANTITIES = {name: RETURNS[name] for name in (NOISY, "evaluation", "best_evaluation")}
-"""Columns of the metrics that are drawn, with the title of their axis."""
+QUANTITIES = NOISY, "evaluation", "best_evaluation"
+"""Columns of the metrics that are drawn."""
 
 _HORIZON_MARKERS = ("circle", "square", "triangle-up", "diamond")
 _MARKERS = 12
@@ -23,7 +30,10 @@ _MARKERS = 12
 
 
 def learning_figure(
-    metrics: pd.DataFrame, optima: Mapping[str, float] | None = None, quantity: str = NOISY
+    metrics: pd.DataFrame,
+    optima: Mapping[str, float] | None = None,
+    quantity: str = NOISY,
+    unit: str = BPS,
 ) -> go.Figure:
     """What learners earned against the episodes, a color per scheme.
 
@@ -35,8 +45,9 @@ def learning_figure(
     Args:
         metrics: rows of ``metrics.csv``, whose ``scheme`` is a mode rule as it stands there, or
             a name of :data:`hyuav.experiments.schemes.LABELS`. May be empty.
-        optima: what the best flight earns in bps/Hz, by mode rule.
+        optima: what the best flight earns, by mode rule.
         quantity: a column of :data:`QUANTITIES`.
+        unit: of the reward.
     """
     figure = go.Figure(layout=base_layout())
     curves = sorted(learning_curves(metrics, quantity), key=lambda curve: curve.place)
@@ -48,7 +59,7 @@ def learning_figure(
             symbol = _HORIZON_MARKERS[horizons.index(curve.num_slots) % len(_HORIZON_MARKERS)]
             look |= {"mode": "lines+markers"}
             look["marker"] |= {"symbol": symbol, "size": 7, "maxdisplayed": _MARKERS}
-        _add_curve(figure, curve, text, look, noisy=quantity == NOISY)
+        _add_curve(figure, curve, text, look, plain(unit), noisy=quantity == NOISY)
     if len(horizons) <= 1:
         _add_optima(figure, curves, optima or {})
     if not curves:
@@ -58,7 +69,7 @@ def learning_figure(
         height=460,
         margin={"l": 60, "r": 15, "t": 25, "b": 110},
         xaxis=axis("Episode", rangemode="tozero", nticks=8),
-        yaxis=axis(QUANTITIES[quantity], nticks=8),
+        yaxis=axis(plain(axis_title(quantity, unit)), nticks=8),
         legend=legend_below(y=-0.17),
         hovermode="closest",
     )
@@ -74,7 +85,13 @@ def _look(scheme: str) -> dict[str, Any]:
 
 
 def _add_curve(
-    figure: go.Figure, curve: LearningCurve, text: str, look: dict[str, Any], *, noisy: bool
+    figure: go.Figure,
+    curve: LearningCurve,
+    text: str,
+    look: dict[str, Any],
+    unit: str,
+    *,
+    noisy: bool,
 ) -> None:
     smooth = (curve.smoothed(SMOOTHING) if noisy else curve).thinned(MAX_POINTS)
     across, hue = list(smooth.learners.index), look["line"]["color"]
@@ -98,7 +115,7 @@ def _add_curve(
         **look | ({} if len(across) > 1 else {"mode": "markers"}),
         name=text,
         legendgroup=text,
-        hovertemplate=f"{text}, episode %{{x:.0f}}: %{{y:.2f}} bps/Hz<extra></extra>",
+        hovertemplate=f"{text}, episode %{{x:.0f}}: %{{y:.2f}} {unit}<extra></extra>",
     )
 
 

@@ -7,14 +7,15 @@ from typing import Any
 import pandas as pd
 
 from hyuav._support.errors import InputError
+from hyuav.envs.rewards import SUM_RATE
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.data.curves import SMOOTHING
+from hyuav.viz.data.curves import SMOOTHING, axis_title
 from hyuav.viz.data.flying import QUICK, fly_now
 from hyuav.viz.data.maps import helper_map
-from hyuav.viz.data.reading import optima_of, readable_config
+from hyuav.viz.data.reading import optima_of, readable_config, unit_of
 from hyuav.viz.data.runs import (
     all_metrics,
     evaluated_scenario,
@@ -47,7 +48,7 @@ def run_page(directory: Path) -> Page:
     summaries = [own.summary for own in evaluated or [own for _, own in flown]]
     sections = [
         _flights(flown, note),
-        _curves(metrics, summaries, scenario),
+        _curves(metrics, summaries, scenario, unit_of(config)),
         _schemes(summaries, [] if evaluated or not flown else [note]),
         map_section({name: scenario} if scenario else {}),
         config_section(config),
@@ -68,6 +69,8 @@ def _facts(
         values = config.get(section)
         if isinstance(values, Mapping) and entry in values:
             facts[title] = str(values[entry])
+    if isinstance(reward := config.get("reward"), str) and reward != SUM_RATE:
+        facts["Reward"] = reward
     if len(metrics):
         facts["Episodes done"] = f"{metrics['episode'].max():.0f}"
         facts["Learners"] = str(len(metrics[["learner", "scheme"]].drop_duplicates()))
@@ -120,17 +123,21 @@ def _flights(several: Sequence[tuple[Scenario, Evaluation]], note: str) -> Secti
 
 
 def _curves(
-    metrics: pd.DataFrame, summaries: Sequence[Mapping[str, Any]], scenario: Scenario | None
+    metrics: pd.DataFrame,
+    summaries: Sequence[Mapping[str, Any]],
+    scenario: Scenario | None,
+    unit: str,
 ) -> Section:
     optima = {summary["num_slots"]: optima_of(summary) for summary in summaries}
     horizons = own_first(metrics["num_slots"].dropna().unique(), scenario)
     figures = {
-        title + (f", T = {horizon:.0f}" if len(horizons) > 1 else ""): learning_figure(
-            own, optima.get(int(horizon)), quantity
+        axis_title(quantity, unit)
+        + (f", T = {horizon:.0f}" if len(horizons) > 1 else ""): learning_figure(
+            own, optima.get(int(horizon)), quantity, unit
         )
         for horizon in horizons
         for own in [metrics[metrics["num_slots"] == horizon]]
-        for quantity, title in QUANTITIES.items()
+        for quantity in QUANTITIES
         if own[quantity].notna().any()
     }
     if not figures:

@@ -8,7 +8,7 @@ from markupsafe import Markup, escape
 
 from hyuav._support.formatting import bounds, or_never, percent
 from hyuav.experiments.comparison.tables import label
-from hyuav.experiments.evaluation_table import flight_cells
+from hyuav.experiments.evaluation_table import earned_title, flight_cells
 from hyuav.viz.data.configuration import SYMBOLS, entries
 from hyuav.viz.data.schemes import scheme_color, scheme_label
 
@@ -70,7 +70,8 @@ def scheme_table(summary: Mapping[str, Any]) -> Markup:
         "with the 95 % interval; energies per episode"
     )
     headings = (
-        *("Scheme", "Secrecy sum-rate (bps/Hz)", "of own optimum", "of hybrid optimum"),
+        *("Scheme", earned_title(summary), "of own optimum"),
+        "Secrecy sum-rate (bps/Hz)" if "reward" in summary else "of hybrid optimum",
         *("Relay slots", "UEs offloading", "Off map", "Energy per UE (mJ)"),
         *("Energy of L (J)", "Energy of H (kJ)", "Budgets exceeded"),
     )

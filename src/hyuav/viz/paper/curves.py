@@ -4,6 +4,7 @@ import matplotlib as mpl
 import pandas as pd
 from matplotlib.figure import Figure
 
+from hyuav.viz.data.curves import BPS, NOISY, axis_title
 from hyuav.viz.data.schemes import COLORS, scheme_label, scheme_line
 from hyuav.viz.paper.style import COLUMN_WIDTH, LINES, STYLE, legend_below
 
@@ -12,7 +13,8 @@ def learning_figure(table: pd.DataFrame) -> Figure:
     """Accumulated reward against episodes, with bands, and the optimum of each scheme as a line.
 
     Args:
-        table: of :func:`.learning_table`, of one training or several, each of which has a panel.
+        table: of :func:`.learning_table`, of one training or several, each of which has a panel;
+            its ``attrs`` may tell the ``unit`` of the reward.
     """
     trainings = list(dict.fromkeys(table["training"]))
     with mpl.rc_context(STYLE):
@@ -39,5 +41,5 @@ def learning_figure(table: pd.DataFrame) -> Figure:
         panels[-1].set_xlabel("Episode")
         handles, _ = panels[-1].get_legend_handles_labels()
         legend_below(figure, handles, 4, 2.0)
-        figure.supylabel("Accumulated reward (bps/Hz)", fontsize=8)
+        figure.supylabel(axis_title(NOISY, table.attrs.get("unit", BPS)), fontsize=8)
         return figure

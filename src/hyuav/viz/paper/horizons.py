@@ -10,6 +10,9 @@ from hyuav.experiments.schemes import LABELS, OPTIMA
 from hyuav.viz.data.schemes import COLORS, COMPARED, scheme_line
 from hyuav.viz.paper.style import COLUMN_WIDTH, LINES, STYLE, legend_below
 
+TITLE = "Secrecy sum-rate (bps/Hz)"
+"""Of what is earned by default."""
+
 MARKERS = {"proposed": "o", "ja_ot": "s", "re_ot": "^", "re_lt": "v", "ja_lt": "D"}
 
 
@@ -17,7 +20,7 @@ def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
     """Secrecy sum-rate against the horizon, for the schemes and the optimum of each mode rule.
 
     Args:
-        table: of :func:`.horizon_table`.
+        table: of :func:`.horizon_table`; its ``attrs`` may tell the ``title`` of another reward.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(COLUMN_WIDTH, 3.0), layout="constrained")
@@ -43,7 +46,7 @@ def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
                 handles.append(bars)
         optimum = Line2D([], [], color="0.3", linestyle=LINES["dotted"], label="its optimum")
         axes.set_xticks(sorted(set(table["num_slots"])))
-        axes.set(xlabel="Time horizon (slots)", ylabel="Secrecy sum-rate (bps/Hz)")
+        axes.set(xlabel="Time horizon (slots)", ylabel=table.attrs.get("title", TITLE))
         axes.set_ylim(0.0, 1.08 * table["mean"].max())  # few learners may have wider intervals
         axes.grid()
         axes.set_axisbelow(True)
