@@ -228,7 +228,11 @@ def test_fairness_begins_anew_where_gymnasium_starts_an_episode() -> None:
     still = dataclasses.replace(TWO_CLUSTERS, fading=False, num_slots=6)
     start = dataclasses.replace(still, helper_starts=((-40.0, 0.0),))
     envs = gymnasium.make_vec(
-        "hyuav/SecureOffloading-v0", 2, scenario=start, reward="proportional_fairness"
+        "hyuav/SecureOffloading-v0",
+        2,
+        scenario=start,
+        reward="proportional_fairness",
+        autoreset_mode="SameStep",
     )
     envs.reset(seed=0)
     hover = np.zeros((2, 2), np.float32)
