@@ -63,7 +63,7 @@ class SAC(AlgorithmParameters):
             learners=learners,
             alpha_init=self.temperature_init,
             num_qvalue_nets=2,
-            target_entropy=-actions if self.target_entropy is None else self.target_entropy,
+            target_entropy=-float(actions) if self.target_entropy is None else self.target_entropy,
             loss_function="l2",
             reduction="none",
             scalar_output_mode="exclude",
