@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from rich.console import Console
 from scipy import stats
 from torch import nn
 
@@ -19,7 +20,7 @@ from hyuav.experiments.evaluation import (
     fly,
     secrecy_sum_rate,
 )
-from hyuav.experiments.policies import Policies
+from hyuav.experiments.policies import Policies, reference_policies
 from hyuav.experiments.schemes import LABELS, OPTIMA
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.robust import RobustTD3
@@ -222,3 +223,29 @@ def test_an_unknown_scheme_or_none_is_refused() -> None:
     for policies in refused:
         with pytest.raises(InputError):
             evaluate(SCENARIO, "two_clusters", policies, FEW)
+
+
+def test_several_helpers_have_columns_of_their_own() -> None:
+    two = dataclasses.replace(
+        SCENARIO,
+        helper_starts=((-60.0, -60.0), (60.0, -60.0)),
+        eavesdropper_positions=((80.0, 80.0), (-80.0, 60.0)),
+    )
+    path = torch.tensor(two.helper_starts).expand(two.num_slots + 1, 2, 2)
+    found = evaluate(two, "two", {"optimum": FlightPolicy(path, two)}, FEW)
+    assert {f"{name}_{helper}" for name in ("x", "y", "relay") for helper in (1, 2)} < set(
+        found.flights.columns
+    )
+    assert (found.flights["x_2"] == 60.0).all()
+    assert found.summary["schemes"]["optimum"]["secrecy_sum_rate"]["mean"] >= 0.0
+
+
+def test_the_optimum_flies_with_the_power_that_was_chosen() -> None:
+    scenario = dataclasses.replace(SCENARIO, power_control=True, power_range=30.0, fading=False)
+    references = reference_policies(scenario, 10.0, Console(quiet=True))
+    found = evaluate(scenario, "power", references, FEW).summary["schemes"]
+    best = solve_optimum(scenario, resolution=10.0)
+    for scheme, rule in (("optimum", "hybrid"), ("ja_optimum", "jamming")):
+        mean = found[scheme]["secrecy_sum_rate"]["mean"]
+        assert mean == pytest.approx(best[rule].value, rel=1e-4)
+    assert found["optimum"]["secrecy_sum_rate"]["mean"] > found["re_lt"]["secrecy_sum_rate"]["mean"]

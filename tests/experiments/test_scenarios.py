@@ -47,3 +47,10 @@ def test_a_comparison_takes_presets_layouts_and_fields() -> None:
     compared = Compare(scenario=("two_clusters", "disk", drawn), layouts=1).scenarios()
     assert list(compared) == ["two_clusters", "disk-0", "loud", "layout-1000"]
     assert compared["loud"] == Scenario(ue_positions=disk(10, seed=2), jamming_power=0.3)
+
+
+@pytest.mark.parametrize("field", ["helper_starts", "eavesdropper_positions"])
+def test_several_helpers_or_eavesdroppers_are_for_python(field: str) -> None:
+    values = {**offered("two_clusters"), field: [[0.0, 0.0], [10.0, 10.0]]}
+    with pytest.raises(InputError, match=rf"^scenario\.{field} = .* in Python so far$"):
+        named_scenario(values)

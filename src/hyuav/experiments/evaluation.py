@@ -285,22 +285,25 @@ def _account(totals: Mapping[str, Tensor], scenario: Scenario) -> dict[str, Any]
 
 
 def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
-    """Flights (episodes, T) as a table with a row per slot; lists hold one entry per UE."""
+    """Flights (episodes, T) as a table with a row per slot; lists hold one entry per UE.
+
+    With several helpers, whose numbers are columns ``x_1``, ``x_2`` and so on.
+    """
     episodes, num_slots = flown.batch_size
     diagnostics = flown["diagnostics"]
     columns = {
         "scheme": [scheme] * (episodes * num_slots),
         "episode": np.repeat(np.arange(episodes), num_slots),
         "slot": np.tile(np.arange(1, num_slots + 1), episodes),
-        "x": flown["position"][..., 0, 0],
-        "y": flown["position"][..., 0, 1],
-        "relay": flown["mode"] == 1,
-        "off_map": flown["off_map"],
+        **_of_helpers("x", flown["position"][..., 0]),
+        **_of_helpers("y", flown["position"][..., 1]),
+        **_of_helpers("relay", flown["mode"] == 1),
+        **_of_helpers("off_map", flown["off_map"]),
         "secrecy_sum_rate": secrecy_sum_rate(flown),
         "relay_sum_rate": diagnostics["relay_sum_rate"],
         "jamming_sum_rate": diagnostics["jamming_sum_rate"],
         "edge_energy": diagnostics["edge_energy"],
-        "helper_energy": diagnostics["helper_energy"],
+        **_of_helpers("helper_energy", diagnostics["helper_energy"]),
         "budget_violation": diagnostics["budget_violation"],
     }
     table = pd.DataFrame(
@@ -312,3 +315,12 @@ def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
     for name in ("offloading", "secrecy_rate", "ue_energy"):
         table[name] = diagnostics[name].flatten(0, 1).tolist()
     return table
+
+
+def _of_helpers(name: str, values: Tensor) -> dict[str, Tensor]:
+    """A column of values (..., H) for each helper, numbered where there are several."""
+    several = values.shape[-1] > 1
+    return {
+        f"{name}_{number}" if several else name: own
+        for number, own in enumerate(values.unbind(dim=-1), start=1)
+    }

@@ -111,5 +111,5 @@ def reference_policies(
     with make_progress(console, "optima") as progress:
         optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
-        policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario)]
+        policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario, optimum.share)]
     return policies

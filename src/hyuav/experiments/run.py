@@ -29,6 +29,13 @@ class Run:
     configuration: RunConfiguration
     """All that was asked of the training."""
 
+    def __repr__(self) -> str:
+        told = self.configuration
+        learners = f"{len(told.learners)} learner{'s' * (len(told.learners) > 1)}"
+        return (
+            f"Run({self.directory.path}: {told.algorithm_name}, {told.scenario_name}, {learners})"
+        )
+
     @property
     def scenario(self) -> Scenario:
         """What was flown; learners may have had another horizon."""

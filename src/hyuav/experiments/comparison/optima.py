@@ -60,6 +60,7 @@ class Optima:
                     "slot": range(num_slots + 1),
                     "x": optimum.path[:, 0, 0],
                     "y": optimum.path[:, 0, 1],
+                    "power": [1.0, *optimum.share[:, 0].tolist()],
                 }
             )
             for rule, optima in found.items()
@@ -75,9 +76,10 @@ class Optima:
         """
         flights = self._flights()
         flight = flights[(flights["scheme"] == rule) & (flights["num_slots"] == num_slots)]
-        path = torch.tensor(flight.sort_values("slot")[["x", "y"]].to_numpy()).unsqueeze(1)
-        return FlightPolicy(path, self.scenario)
+        flight = flight.sort_values("slot")
+        path = torch.tensor(flight[["x", "y"]].to_numpy()).unsqueeze(1)
+        return FlightPolicy(path, self.scenario, torch.tensor(flight[["power"]].to_numpy()[1:]))
 
     def _flights(self) -> pd.DataFrame:
-        columns = ["scheme", "num_slots", "value", "standard_error", "slot", "x", "y"]
+        columns = ["scheme", "num_slots", "value", "standard_error", "slot", "x", "y", "power"]
         return read_parquet(self.file, "best flights", columns)

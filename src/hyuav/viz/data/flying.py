@@ -121,7 +121,7 @@ def flown(
         InputError: as :func:`resolution`, or the checkpoint does not fit the scenario.
     """
     best = optimum(scenario, rule, fine=fine)
-    policies: Policies = {OPTIMA[rule]: [FlightPolicy(best.path, scenario)]}
+    policies: Policies = {OPTIMA[rule]: [FlightPolicy(best.path, scenario, best.share)]}
     if checkpoint is not None:
         policies[LEARNED[rule]] = [_policy(scenario, checkpoint)]
     return evaluate(scenario, "changed", policies, EPISODES)
