@@ -4,11 +4,10 @@ hyuav copy algorithm1
 python algorithm1.py
 """
 
-import logging
-
 import torch
 from tensordict.nn import TensorDictModule, TensorDictSequential
 from torch import nn
+from torchrl import torchrl_logger
 from torchrl.collectors import Collector
 from torchrl.data import LazyTensorStorage, ReplayBuffer
 from torchrl.modules import MLP, ValueOperator
@@ -96,5 +95,5 @@ def train(
 
 
 if __name__ == "__main__":
-    logging.getLogger("torchrl").setLevel(logging.WARNING)  # or it would tell of its storage
+    torchrl_logger.setLevel("WARNING")  # or it would tell of its storage
     train()
