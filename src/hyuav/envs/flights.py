@@ -104,7 +104,7 @@ class Flights:
         after = flown["next"]
         reward = after["reward"]
         sum_rate = reward + self.scenario.off_map_penalty * after["off_map"].sum(
-            dim=-1, keepdim=True
+            dim=-1, keepdim=True, dtype=reward.dtype
         )
         self._state = self.env.step_mdp(flown)
         return _column(reward), _column(sum_rate), _column(after["truncated"])
