@@ -135,7 +135,8 @@ def test_a_mistake_is_told_as_the_recipe_tells_it(command: str) -> None:
 
 
 def test_words_that_are_no_options_are_answered_in_one_line(command: str) -> None:
-    assert run(command, "train", "--foo").stderr == "error: unrecognized arguments: --foo\n"
+    line = "error: unrecognized arguments: --foo (NAME=VALUE is written without dashes)\n"
+    assert run(command, "train", "--foo").stderr == line
     assert not list(Path.cwd().iterdir())
 
 

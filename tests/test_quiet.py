@@ -53,7 +53,7 @@ import hyuav
 scenario = dataclasses.replace(hyuav.Scenario.preset("two_clusters"), num_slots=5)
 best = hyuav.FlightPolicy(hyuav.solve_optimum(scenario, resolution=10.0)["hybrid"].path, scenario)
 few = hyuav.EvaluationParameters(episodes=3, flights=2)
-hyuav.evaluate(scenario, "own", {"optimum": [hyuav.Policy(best)]}, few)
+hyuav.evaluate(scenario, "own", {"optimum": [best]}, few)
 """
 
 COMPILED = """

@@ -1,5 +1,6 @@
 """The notebook runs as it stands, from top to bottom, in a kernel of its own."""
 
+import copy
 import os
 import sys
 from pathlib import Path
@@ -24,7 +25,8 @@ def test_it_runs_from_top_to_bottom(
     scripts = str(Path(sys.executable).parent)  # where the command is
     monkeypatch.setenv("PATH", os.pathsep.join([scripts, os.environ["PATH"]]))
     resources = {"metadata": {"path": str(tmp_path)}}
-    client = NotebookClient(kept.copy(), timeout=600, kernel_name="python3", resources=resources)
+    fresh = copy.deepcopy(kept)
+    client = NotebookClient(fresh, timeout=600, kernel_name="python3", resources=resources)
     ran = client.execute()
     outputs = [output for cell in ran.cells for output in cell.get("outputs", ())]
     assert not [each for each in outputs if each.output_type == "error"]

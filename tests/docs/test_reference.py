@@ -69,7 +69,8 @@ def test_a_recipe_that_changes_a_default_shows_its_own() -> None:
 def test_a_row_gives_default_check_unit_symbol_and_meaning() -> None:
     by_name = {row[0]: row for row in rows(table(Scenario))}
     shown = ["`max_speed`", "`20`", "a number in [1e-09, 1e+09]", "m/s", r"$v_{\mathrm{max}}$"]
-    assert by_name["`max_speed`"] == shown
+    assert by_name["`max_speed`"] == [*shown, ""]
+    assert by_name["`power_range`"][-1] == "How far below the nominal power the least is."
     assert by_name["`ue_positions`"][1] == "required"
     geofence = {row[0]: row for row in rows(table(DDPG))}["`geofence`"]
     assert geofence[1:3] == ["`false`", "true or false"]

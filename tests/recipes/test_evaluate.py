@@ -56,7 +56,7 @@ def test_a_policy_flies_elsewhere_beside_the_optimum_there_and_loses_nothing_of_
 REFUSALS = {
     "num_slots=20": "num_slots = 20: expected what learners were trained for, 8\n",
     "scenario.ue_positions=[[0,1]]": "number of UEs = 1: expected 10, for which the checkpoint was",
-    "scenario=square": "scenario = 'square': expected one of as_trained, random_disk, two_clusters",
+    "scenario=square": "scenario = 'square': expected one of as_trained, clusters, disk, ",
     "scenario.jamming_power=-1": "jamming_power = -1: expected a number in [0, 1e+06]",
     "scenario.num_slots=0": "num_slots = 0: expected a whole number >= 1",
 }

@@ -146,7 +146,9 @@ def sum_rate_of(after: TensorDictBase, off_map_penalty: float) -> Tensor:
     told: Tensor | None = after.get(SUM_RATE, None)
     if told is not None:
         return told
-    return after["reward"] + off_map_penalty * after["off_map"].sum(dim=-1, keepdim=True)
+    reward: Tensor = after["reward"]
+    off_map = after["off_map"].sum(dim=-1, keepdim=True, dtype=reward.dtype)
+    return reward + off_map_penalty * off_map
 
 
 def _sent(reward: Reward) -> tuple[Any, ...]:

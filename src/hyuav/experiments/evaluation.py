@@ -201,8 +201,9 @@ def fly(
         flown = env.step(module(state))
         found = _per_slot(flown["next"])
         if reward != DEFAULT:
-            penalty = scenario.off_map_penalty * flown["next", "off_map"].sum(-1, keepdim=True)
-            found["reward"] = (flown["next", "reward"] + penalty).squeeze(-1)
+            own = flown["next", "reward"]
+            off_map = flown["next", "off_map"].sum(dim=-1, keepdim=True, dtype=own.dtype)
+            found["reward"] = (own + scenario.off_map_penalty * off_map).squeeze(-1)
         for name, values in found.items():
             totals[name] = totals[name] + values if name in totals else values.double()
         slots.append(flown["next"][0, : parameters.flights].cpu())
