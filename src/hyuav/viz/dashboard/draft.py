@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hyuav._support.errors import InputError, rejection
+from hyuav._support.parameters import OneOf, declared
 from hyuav.envs.rendering import EAVESDROPPER_LABEL, LEGITIMATE_LABEL
 from hyuav.physics.scenario import PRESETS, Point, Scenario
 
@@ -30,8 +31,6 @@ _TASKS = (
     *("ue_energy_budget", "edge_energy_budget", "helper_energy_budget"),
 )
 
-CHOICES = {"speed_limit": ("box", "disc")}
-
 FIELDS = {field.name: field for field in dataclasses.fields(Scenario)}
 
 _RADIO = tuple(name for name in FIELDS if name not in (*NODES, "ue_positions", *_FLIGHT, *_TASKS))
@@ -40,6 +39,14 @@ GROUPS = {"Flight": _FLIGHT, "Radio": _RADIO, "Tasks": _TASKS}
 """All parameters but the positions; what has no other group is of the radio."""
 
 KINDS: dict[str, Any] = typing.get_type_hints(Scenario)
+
+CHOICES = {
+    name: check.choices
+    for name, annotation in typing.get_type_hints(Scenario, include_extras=True).items()
+    for check in declared(annotation).metadata
+    if isinstance(check, OneOf)
+}
+"""What a field may be of which the scenario accepts these words alone."""
 
 SCENARIOS = "scenario"
 """Directory below the runs in which scenarios are saved: the name of Hydra's group."""
