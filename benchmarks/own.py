@@ -4,7 +4,7 @@ import torch
 
 from benchmarks.work import ENDLESS, SLOTS_AT_A_TIME, Work
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 

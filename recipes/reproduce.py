@@ -51,7 +51,7 @@ from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
 from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
 from hyuav.experiments.train import train_or_resume
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Preset, Scenario

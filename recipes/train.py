@@ -46,7 +46,7 @@ from hyuav.experiments.quoting import override
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train_or_resume
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.modes import ModeRuleName
 from hyuav.viz.html.page import write_report

@@ -8,7 +8,7 @@ from hyuav import Scenario
 from hyuav.experiments.metrics import METRIC_COLUMNS
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)

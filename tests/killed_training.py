@@ -18,7 +18,7 @@ from hyuav.experiments.train import resume, train
 from hyuav.learning.checkpoint import load_checkpoint
 from hyuav.learning.guide.parameters import Guide
 from hyuav.learning.guide.robust import RobustDDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 OFF = LoggerParameters(mode="disabled")

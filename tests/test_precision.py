@@ -32,7 +32,8 @@ from hyuav import (
 from hyuav.envs.rendering import render_frame
 from hyuav.learning.policy import learned_policy
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.physics.slot import Control, Physics
+from hyuav.physics.outcome import Control
+from hyuav.physics.slot import Physics
 from hyuav.viz.data.maps import helper_map
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)

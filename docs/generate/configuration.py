@@ -21,8 +21,8 @@ from pydantic.fields import FieldInfo
 from hyuav._support.parameters import OrOne, Parameters, declared
 from hyuav._support.parameters import accepted as words
 from hyuav.experiments.tracking import LoggerParameters
+from hyuav.learning.learners import Learner
 from hyuav.learning.registry import ALGORITHMS, BUILT_IN
-from hyuav.learning.train import Learner
 from hyuav.physics.families import LAYOUTS
 from hyuav.physics.scenario import PRESETS, Scenario
 
@@ -80,7 +80,8 @@ def configuration_page() -> str:
         "([Tracking](../tracking.md)).",
         table(LoggerParameters, LoggerParameters.defaults()),
         "## `learners`",
-        "In a run's `config.yaml`, and in Python: [`hyuav.Learner`][hyuav.learning.train.Learner].",
+        "In a run's `config.yaml`, and in Python: "
+        "[`hyuav.Learner`][hyuav.learning.learners.Learner].",
         table(Learner),
     ]
     return "\n\n".join(parts) + "\n"

@@ -20,11 +20,11 @@ from hyuav.learning.guide.parameters import Guide as Guide
 from hyuav.learning.guide.robust import RobustDDPG as RobustDDPG
 from hyuav.learning.guide.robust import RobustSAC as RobustSAC
 from hyuav.learning.guide.robust import RobustTD3 as RobustTD3
+from hyuav.learning.learners import Learner as Learner
 from hyuav.learning.policy import Policy as Policy
 from hyuav.learning.registry import register as register
 from hyuav.learning.sac import SAC as SAC
 from hyuav.learning.td3 import TD3 as TD3
-from hyuav.learning.train import Learner as Learner
 from hyuav.learning.training import Training as Training
 from hyuav.learning.training import TrainingParameters as TrainingParameters
 from hyuav.physics.families import ClustersLayout as ClustersLayout

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-import reference
+import worlds
 from hyuav import InputError, InputTypeError, Scenario
 from hyuav._support.parameters import (
     Count,
@@ -238,7 +238,7 @@ def test_a_record_that_nothing_would_check_is_no_record() -> None:
         Unchecked(seats=0)
 
 
-@given(reference.scenarios())
+@given(worlds.scenarios())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_scenario_survives_a_file_without_loss(tmp_path: Path, scenario: Scenario) -> None:
     file = tmp_path / "scenario.yaml"
@@ -259,7 +259,7 @@ def test_every_bit_of_a_number_survives_a_file(tmp_path: Path, name: str, value:
     assert getattr(Scenario.load(file), name) == value
 
 
-@given(reference.scenarios())
+@given(worlds.scenarios())
 def test_a_scenario_survives_plain_values_without_loss(scenario: Scenario) -> None:
     values = scenario.to_dict()
     assert set(values) == set(FIELDS)

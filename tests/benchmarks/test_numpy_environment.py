@@ -9,6 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import reference
+import worlds
 from benchmarks.numpy_environment import NumpyEnv
 from hyuav import Scenario, make_env
 from hyuav.physics.channel import rician_power
@@ -28,12 +29,12 @@ def slot_of_the_model(
     return flown, reference.slot(scenario, scheme, flown.position, fading, cycles)
 
 
-@given(st.data(), reference.scenarios(), st.sampled_from(MODE_RULES), st.integers(0, 2**31))
+@given(st.data(), worlds.scenarios(), st.sampled_from(MODE_RULES), st.integers(0, 2**31))
 def test_a_slot_is_the_models_slot_in_any_world(
     data: st.DataObject, scenario: Scenario, scheme: str, seed: int
 ) -> None:
-    position = data.draw(reference.helpers(scenario))
-    action = data.draw(reference.actions())
+    position = data.draw(worlds.helpers(scenario))
+    action = data.draw(worlds.actions())
     env = NumpyEnv(scenario, scheme)
     rng = np.random.default_rng(seed)
     fading = rng.exponential(size=3 * scenario.num_ues + 2) if scenario.fading else None

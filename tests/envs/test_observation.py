@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import reference
+import worlds
 from hyuav import InputError, Scenario, make_env
 from hyuav.envs.observation import ObservationLayout
 from reference import fly, place, start_at
@@ -16,12 +17,12 @@ TWO_CLUSTERS = Scenario.preset("two_clusters")
 SEEDS = st.integers(0, 2**31)
 
 
-@given(reference.scenarios(), st.data(), SEEDS)
+@given(worlds.scenarios(), st.data(), SEEDS)
 def test_the_observation_is_the_state_normalized_to_order_one(
     scenario: Scenario, data: st.DataObject, seed: int
 ) -> None:
     env = make_env(scenario, batch_size=3, seed=seed)
-    points = data.draw(st.lists(reference.helpers(scenario), min_size=3, max_size=3))
+    points = data.draw(st.lists(worlds.helpers(scenario), min_size=3, max_size=3))
     state = start_at(env, points)
     half = scenario.map_side / 2
     for _ in range(2):

@@ -18,7 +18,7 @@ from torchrl.envs.utils import check_env_specs
 
 from hyuav import InputError, InputTypeError, Reward, Scenario, SecureOffloadingEnv, make_env
 from hyuav.envs.rewards import FAIR_RATE, REWARDS, as_reward
-from hyuav.physics.slot import SlotOutcome
+from hyuav.physics.outcome import SlotOutcome
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
 COMING_WITH_IT = ["secrecy_energy_efficiency", "proportional_fairness"]

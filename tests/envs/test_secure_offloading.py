@@ -9,6 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import reference
+import worlds
 from hyuav import Scenario, SecureOffloadingEnv
 from hyuav.physics.modes import MODE_RULES
 from reference import assert_same, changed, fly, next_draws, place, start_at
@@ -19,12 +20,12 @@ SEEDS = st.integers(0, 2**31)
 ROWS = 4
 
 
-@given(reference.scenarios(), st.data(), SEEDS)
+@given(worlds.scenarios(), st.data(), SEEDS)
 def test_every_slot_is_that_of_scalar_loops(
     scenario: Scenario, data: st.DataObject, seed: int
 ) -> None:
     schemes = data.draw(st.lists(st.sampled_from(MODE_RULES), min_size=ROWS, max_size=ROWS))
-    start = data.draw(st.lists(reference.helpers(scenario), min_size=ROWS, max_size=ROWS))
+    start = data.draw(st.lists(worlds.helpers(scenario), min_size=ROWS, max_size=ROWS))
     env = SecureOffloadingEnv(scenario, schemes, (ROWS,), seed=seed, diagnostics=True)
     powers, cycles = next_draws(env)
     state = start_at(env, start)
@@ -35,7 +36,7 @@ def test_every_slot_is_that_of_scalar_loops(
         assume(slot.margin > 1e-4)
         assert state["mode"][row].tolist() == list(slot.modes)
     for _ in range(3):
-        action = data.draw(st.lists(reference.actions(), min_size=ROWS, max_size=ROWS))
+        action = data.draw(st.lists(worlds.actions(), min_size=ROWS, max_size=ROWS))
         before = [reference.as_list(position) for position in place(state)]
         powers, cycles = next_draws(env)
         state = fly(env, state, action)

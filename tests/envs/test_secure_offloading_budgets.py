@@ -8,10 +8,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-import reference
+import worlds
 from hyuav import Scenario, SecureOffloadingEnv
 from hyuav.physics.modes import MODE_RULES
-from hyuav.physics.slot import Control, Physics, slot
+from hyuav.physics.outcome import Control
+from hyuav.physics.slot import Physics, slot
 from reference import assert_same, changed, fly, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")
@@ -29,7 +30,7 @@ UNLIMITED = {
 @given(
     st.sampled_from([TWO_CLUSTERS, RANDOM_DISK]),
     st.sampled_from(MODE_RULES),
-    st.lists(reference.coordinates(100.0), min_size=8, max_size=8),
+    st.lists(worlds.coordinates(100.0), min_size=8, max_size=8),
     st.booleans(),
     SEEDS,
 )
@@ -139,7 +140,7 @@ def test_the_edge_computes_in_a_slot_what_it_took_in_the_previous_one() -> None:
     st.floats(0.1, 3000.0),
     st.sampled_from(["box", "disc"]),
     st.sampled_from(MODE_RULES),
-    reference.actions(),
+    worlds.actions(),
 )
 def test_a_small_flight_budget_shortens_the_velocity_and_keeps_its_direction(
     budget: float, speed_limit: str, scheme: str, action: tuple[float, float]

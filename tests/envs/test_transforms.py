@@ -12,7 +12,8 @@ from torchrl.envs.utils import check_env_specs
 
 from hyuav import InputError, Scenario, SecureOffloadingEnv, make_env
 from hyuav.physics.modes import MODE_RULES
-from hyuav.physics.slot import Control, slot
+from hyuav.physics.outcome import Control
+from hyuav.physics.slot import slot
 from reference import assert_same, fly, place, start_at
 
 TWO_CLUSTERS = Scenario.preset("two_clusters")

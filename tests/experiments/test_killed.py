@@ -17,7 +17,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking.checkpoints import Reported, save_checkpoints
 from hyuav.learning.checkpoint import load_checkpoint
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from killed_training import differences, outcome, process, small
 

@@ -13,7 +13,7 @@ from hyuav import EvaluationParameters, InputError, Policy, Run, evaluate, load
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.train import train
 from hyuav.learning.guide.robust import RobustDDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.scenario import Scenario
 from sample_runs import SILENT, UNLOGGED

@@ -5,10 +5,10 @@ import pytest
 
 from hyuav import InputError, Scenario
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory, named_algorithm
+from hyuav.learning.learners import Learner
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
-from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 
 CONFIGURATION = RunConfiguration(

@@ -31,8 +31,8 @@ from hyuav.learning.checkpoint import FORMAT, load_checkpoint, save_checkpoint
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.parameters import Guide
 from hyuav.learning.guide.robust import RobustSAC
+from hyuav.learning.learners import Learner
 from hyuav.learning.policy import learned_policy
-from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0), (-3.0, 4.0)), num_slots=2)

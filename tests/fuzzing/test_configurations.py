@@ -31,8 +31,8 @@ from hyuav.experiments.comparison.plan import Compare
 from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import EvaluationLoggerParameters, LoggerParameters
+from hyuav.learning.learners import Learner
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.viz.dashboard.serve import Dashboard
 from recipe_calls import Call, Refusal

@@ -11,8 +11,9 @@ from torch import Tensor
 from batches import TEN_UES, mini_batch
 from hyuav.learning.algorithm import Algorithm
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.learners import Learner
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.train import Cohort, Learner, update_networks, update_targets
+from hyuav.learning.train import Cohort, update_networks, update_targets
 from hyuav.learning.weights import copy_weights, load_weights, replace_learners
 
 NAMES = sorted(ALGORITHMS)

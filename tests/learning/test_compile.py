@@ -12,9 +12,10 @@ from hyuav import InputError, Scenario
 from hyuav.envs.rewards import as_reward
 from hyuav.learning import training as training_module
 from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.learners import Learner
 from hyuav.learning.registry import ALGORITHMS
 from hyuav.learning.torchrl_internals import next_observation
-from hyuav.learning.train import Cohort, Learner
+from hyuav.learning.train import Cohort
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.physics.modes import MODE_RULES
 

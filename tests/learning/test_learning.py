@@ -7,8 +7,8 @@ import torch
 from scipy import stats
 
 from hyuav import Scenario
+from hyuav.learning.learners import Learner
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.references.optimum import solve_optimum
 

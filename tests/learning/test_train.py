@@ -9,7 +9,7 @@ import torch
 from hyuav import InputError, Scenario
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.robust import RobustSAC
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import Training, TrainingParameters
 
 SCENARIO = Scenario(ue_positions=((1.0, 2.0), (-3.0, 4.0)), num_slots=2)

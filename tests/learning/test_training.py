@@ -8,8 +8,8 @@ import torch
 from hyuav import Scenario
 from hyuav._support.errors import InputError, InputTypeError
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
+from hyuav.learning.learners import Learner
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.learning.weights import copy_weights, join_learners, select_learners
 

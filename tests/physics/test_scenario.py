@@ -11,7 +11,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-import reference
+import worlds
 from hyuav import InputError, InputTypeError, Scenario
 from hyuav.physics.scenario import PRESETS
 
@@ -367,7 +367,7 @@ def test_changing_the_given_list_does_not_change_the_scenario() -> None:
     assert scenario.ue_positions == ((1.0, 2.0), (3.0, 4.0))
 
 
-@given(reference.scenarios())
+@given(worlds.scenarios())
 def test_equal_scenarios_are_one_key(scenario: Scenario) -> None:
     copy = dataclasses.replace(scenario)
     other = dataclasses.replace(scenario, num_slots=scenario.num_slots + 1)

@@ -9,9 +9,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import reference
+import worlds
 from hyuav import Scenario
 from hyuav.physics.modes import ModeRule, mode_vectors
-from hyuav.physics.slot import Control, Physics, SlotOutcome, slot
+from hyuav.physics.outcome import Control, SlotOutcome
+from hyuav.physics.slot import Physics, slot
 from hyuav.physics.tasks import draw_tasks, mean_tasks
 
 TINY = 1e-9
@@ -124,12 +126,12 @@ def test_helpers_that_cannot_be_told_apart_are_as_one_for_a_relayed_ue() -> None
     assert set(two.relay.way.tolist()) == {1}  # type: ignore[union-attr]
 
 
-@given(reference.scenarios(several=True), st.data(), st.integers(0, 2**31))
+@given(worlds.scenarios(several=True), st.data(), st.integers(0, 2**31))
 def test_slots_are_those_of_scalar_loops(
     scenario: Scenario, data: st.DataObject, seed: int
 ) -> None:
     count = scenario.num_helpers
-    places = [data.draw(reference.helpers(scenario)) for _ in range(count)]
+    places = [data.draw(worlds.helpers(scenario)) for _ in range(count)]
     shares = st.sampled_from([0.0, 1e-3, 0.5, 1.0])
     power = data.draw(st.lists(shares, min_size=count, max_size=count))
     letters = ["".join("r" if own else "j" for own in modes) for modes in mode_vectors(count)]

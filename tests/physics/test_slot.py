@@ -9,12 +9,14 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 import reference
+import worlds
 from hyuav import Scenario
 from hyuav.physics.energy import budget_speeds
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import MODE_RULES, ModeRule
+from hyuav.physics.outcome import Control
 from hyuav.physics.scenario import PRESETS
-from hyuav.physics.slot import Control, Geometry, Physics, slot
+from hyuav.physics.slot import Geometry, Physics, slot
 from hyuav.physics.tasks import Tasks, draw_tasks, mean_tasks
 from reference import hover, with_helper
 
@@ -92,20 +94,20 @@ def test_the_gains_of_the_first_ue_of_two_clusters() -> None:
     assert values == pytest.approx(expected, rel=1e-6)
 
 
-@given(reference.scenarios(), st.data())
+@given(worlds.scenarios(), st.data())
 def test_distances_are_to_the_ues_then_the_legitimate_then_the_eavesdropper_uav(
     scenario: Scenario, data: st.DataObject
 ) -> None:
-    helper = data.draw(reference.helpers(scenario))
+    helper = data.draw(worlds.helpers(scenario))
     distances = geometry(double(scenario), helper).distances
     assert reference.as_list(distances) == pytest.approx(reference.distances(scenario, helper))
 
 
-@given(reference.scenarios(), st.data(), SEEDS)
+@given(worlds.scenarios(), st.data(), SEEDS)
 def test_the_gains_are_those_of_scalar_loops(
     scenario: Scenario, data: st.DataObject, seed: int
 ) -> None:
-    helper = data.draw(reference.helpers(scenario))
+    helper = data.draw(worlds.helpers(scenario))
     physics = double(scenario)
     fading, _, powers, _ = random_slot(physics, seed)
     links = None if fading is None else physics.link_row.unflatten(fading)
@@ -118,11 +120,11 @@ def test_the_gains_are_those_of_scalar_loops(
     assert found.helper_eavesdropper.tolist() == nearly(expected.g_he)
 
 
-@given(reference.scenarios(), st.data(), SEEDS)
+@given(worlds.scenarios(), st.data(), SEEDS)
 def test_both_modes_are_those_of_scalar_loops(
     scenario: Scenario, data: st.DataObject, seed: int
 ) -> None:
-    helper = data.draw(reference.helpers(scenario))
+    helper = data.draw(worlds.helpers(scenario))
     physics = double(scenario)
     fading, tasks, powers, cycles = random_slot(physics, seed)
     found = hover(physics, helper, fading, tasks)
@@ -136,12 +138,12 @@ def test_both_modes_are_those_of_scalar_loops(
         assert float(outcome.sum_rate) == pytest.approx(expected.sum_rate, rel=1e-9, abs=1e-9)
 
 
-@given(reference.scenarios(), st.sampled_from(MODE_RULES), st.data())
+@given(worlds.scenarios(), st.sampled_from(MODE_RULES), st.data())
 def test_flights_are_those_of_scalar_loops(
     scenario: Scenario, scheme: str, data: st.DataObject
 ) -> None:
-    start = data.draw(reference.helpers(scenario))
-    action = data.draw(reference.actions())
+    start = data.draw(worlds.helpers(scenario))
+    action = data.draw(worlds.actions())
     expected = reference.flight(scenario, scheme, start, action)
     assume(expected.margin > TINY)
     physics = double(scenario)
@@ -154,11 +156,11 @@ def test_flights_are_those_of_scalar_loops(
     assert flown.control.velocity[0].tolist() == pytest.approx(expected.velocity, abs=1e-9)
 
 
-@given(reference.scenarios(fading=True), st.data(), SEEDS)
+@given(worlds.scenarios(fading=True), st.data(), SEEDS)
 def test_positions_are_independent_of_the_batch_they_are_evaluated_in(
     scenario: Scenario, data: st.DataObject, seed: int
 ) -> None:
-    points = st.lists(reference.helpers(scenario), min_size=6, max_size=6)
+    points = st.lists(worlds.helpers(scenario), min_size=6, max_size=6)
     position = torch.tensor(data.draw(points), dtype=torch.float64)
     physics = double(scenario)
     generator = torch.Generator().manual_seed(seed)
@@ -177,12 +179,12 @@ def test_positions_are_independent_of_the_batch_they_are_evaluated_in(
             torch.testing.assert_close(batched.sum_rate.flatten()[row], single.sum_rate)
 
 
-@given(reference.scenarios(fading=False), st.data())
+@given(worlds.scenarios(fading=False), st.data())
 def test_a_layout_in_each_row_is_as_that_layout_alone(
     scenario: Scenario, data: st.DataObject
 ) -> None:
     half, count = scenario.map_side / 2, scenario.num_ues
-    points = st.lists(reference.coordinates(half), min_size=count + 3, max_size=count + 3)
+    points = st.lists(worlds.coordinates(half), min_size=count + 3, max_size=count + 3)
     layouts = [data.draw(points) for _ in range(3)]
     rows = [
         dataclasses.replace(
@@ -207,11 +209,11 @@ def test_a_layout_in_each_row_is_as_that_layout_alone(
             torch.testing.assert_close(batched.sum_rate[index, 0], single.sum_rate)
 
 
-@given(reference.scenarios(), st.data(), st.floats(0.0, 1.0), SEEDS)
+@given(worlds.scenarios(), st.data(), st.floats(0.0, 1.0), SEEDS)
 def test_power_is_in_units_of_the_modes_nominal_power(
     scenario: Scenario, data: st.DataObject, share: float, seed: int
 ) -> None:
-    helper = data.draw(reference.helpers(scenario))
+    helper = data.draw(worlds.helpers(scenario))
     weaker = dataclasses.replace(
         scenario,
         relay_power=scenario.relay_power * share,

@@ -10,8 +10,9 @@ import torch
 from hyuav import InputError, InputTypeError, Scenario, make_env
 from hyuav.physics.energy import budget_speeds
 from hyuav.physics.modes import MODE_RULES
+from hyuav.physics.outcome import Control
 from hyuav.physics.scenario import PRESETS
-from hyuav.physics.slot import Control, Physics, slot
+from hyuav.physics.slot import Physics, slot
 from hyuav.references.flight import FlightPolicy, flyable
 from hyuav.references.optimum import RESOLUTION, Optimum, solve_horizons, solve_optimum
 

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from hyuav import FlightPolicy, InputError, Reward, Scenario, make_env, solve_optimum
-from hyuav.physics.slot import SlotOutcome
+from hyuav.physics.outcome import SlotOutcome
 from hyuav.references.grid import Reach
 
 EFFICIENCY = "secrecy_energy_efficiency"

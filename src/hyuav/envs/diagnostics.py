@@ -6,8 +6,8 @@ from torch import Tensor
 from torchrl.data import Binary, Composite, Unbounded
 
 from hyuav.physics import energy
+from hyuav.physics.outcome import SlotOutcome
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SlotOutcome
 from hyuav.physics.tasks import Tasks
 
 

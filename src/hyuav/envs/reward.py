@@ -12,8 +12,9 @@ from torchrl.envs import Compose, Transform
 
 from hyuav._support.errors import InputError, InputTypeError, rejection, require_choice
 from hyuav._support.registry import failure
+from hyuav.physics.outcome import Control, SlotOutcome
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import Control, Physics, SlotOutcome, slot
+from hyuav.physics.slot import Physics, slot
 from hyuav.physics.tasks import mean_tasks
 
 POSITION, VELOCITY, EPISODE = DEPENDENCES = ("position", "velocity", "episode")
@@ -44,10 +45,11 @@ class Reward:
     """What a slot earns, in place of the secrecy sum-rate.
 
     Args:
-        source: a function that maps a :class:`hyuav.physics.slot.SlotOutcome`, of any leading shape
-            (...), to a tensor (..., 1) and depends on nothing else. Or a transform of TorchRL that
-            changes ``reward``; a class of transforms is called with the scenario. What a transform
-            names in ``in_keys`` is given by the environment, if it is one of :data:`ENTRIES`.
+        source: a function that maps a :class:`hyuav.physics.outcome.SlotOutcome`, of any leading
+            shape (...), to a tensor (..., 1) and depends on nothing else. Or a transform of TorchRL
+            that changes ``reward``; a class of transforms is called with the scenario. What a
+            transform names in ``in_keys`` is given by the environment, if it is one of
+            :data:`ENTRIES`.
         name: in tables and in a run's configuration; the source's own where it is empty.
         unit: of the reward, for labels; empty where there is none.
         depends_on: one of :data:`DEPENDENCES`, which decides how an optimum is found. None lets it

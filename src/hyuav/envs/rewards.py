@@ -12,8 +12,8 @@ from torchrl.envs import Transform
 from hyuav._support.errors import InputTypeError, rejection
 from hyuav._support.registry import Registry
 from hyuav.envs.reward import EPISODE, FUNCTION, POSITION, VELOCITY, Reward, Source
+from hyuav.physics.outcome import SlotOutcome
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import SlotOutcome
 
 FAIR_RATE = 0.01
 """bps/Hz, beside which a UE's mean rate counts in the logarithm of proportional fairness."""

@@ -32,8 +32,9 @@ from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.physics.generators import LayoutGenerator
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import ModeRule
+from hyuav.physics.outcome import Control, SlotOutcome
 from hyuav.physics.scenario import Scenario, ScenarioLike
-from hyuav.physics.slot import Control, Physics, SlotOutcome, slot
+from hyuav.physics.slot import Physics, slot
 from hyuav.physics.tasks import Tasks
 
 

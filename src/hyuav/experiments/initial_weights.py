@@ -9,7 +9,7 @@ from torch import Tensor
 
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.learning.checkpoint import load_weights_file
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import Episode, Training
 from hyuav.learning.weights import select_learners
 

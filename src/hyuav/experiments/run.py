@@ -10,9 +10,9 @@ from torchrl.envs import TransformedEnv
 
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.learning.learners import Learner
 from hyuav.learning.policy import Policy
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
 
 

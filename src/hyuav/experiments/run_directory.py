@@ -24,9 +24,9 @@ from hyuav.experiments.metrics import read_metrics
 from hyuav.experiments.scenarios import named_scenario
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import load_weights_file, save_checkpoint
+from hyuav.learning.learners import Learner
 from hyuav.learning.policy import Policy, learned_policy
 from hyuav.learning.registry import ALGORITHMS
-from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.learning.weights import count_learners
 from hyuav.physics.scenario import Scenario

@@ -1,15 +1,36 @@
-"""What a person may give for the learners of a training."""
+"""Learners, and what a person may give for those of a training."""
 
 from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
+from pydantic.dataclasses import dataclass
 
 from hyuav._support.errors import InputTypeError, rejection
-from hyuav._support.parameters import checked, plain
-from hyuav.learning.train import Learner
+from hyuav._support.parameters import Count, CountOrZero, Parameters, checked, parameter, plain
+from hyuav.physics.modes import ModeRuleName
+from hyuav.physics.scenario import Scenario
 
 _NumLearners = Annotated[int, Field(ge=1, le=10**6)]
+
+
+@dataclass(frozen=True)
+class Learner(Parameters):
+    """What distinguishes one learner from another.
+
+    All its random numbers come from its seed: initial weights, exploration, fading, sampling. So
+    it learns the same alone and among others, and learners of equal seeds that differ in scheme
+    or horizon begin with the same weights and meet the same fading.
+    """
+
+    scheme: ModeRuleName = parameter("hybrid")
+    seed: CountOrZero = parameter(0)
+    num_slots: Count | None = parameter(None, symbol="T")
+    """The horizon; the scenario's where it is None."""
+
+    def horizon(self, scenario: Scenario) -> int:
+        """T: its own, or else the scenario's."""
+        return self.num_slots or scenario.num_slots
 
 
 def as_learners(learners: int | Learner | Sequence[int | Learner]) -> tuple[Learner, ...]:

@@ -6,13 +6,11 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import torch
-from pydantic.dataclasses import dataclass
 from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.collectors import Collector
 
 from hyuav._support.errors import InputError
-from hyuav._support.parameters import Count, CountOrZero, Parameters, parameter
 from hyuav._support.randomness import (
     RowStream,
     derived_seed,
@@ -37,6 +35,7 @@ from hyuav.learning.checkpoint import (
 )
 from hyuav.learning.compile import CompiledSlots, FlownEpisode, all_finite
 from hyuav.learning.exploration import as_planned
+from hyuav.learning.learners import Learner
 from hyuav.learning.policy import NoiseFreeReturn, fly_noise_free
 from hyuav.learning.replay import latest, make_replay
 from hyuav.learning.torchrl_internals import cursor_of, next_observation, set_filled
@@ -50,27 +49,7 @@ from hyuav.learning.weights import (
     replace_learners,
 )
 from hyuav.physics.generators import LayoutGenerator
-from hyuav.physics.modes import ModeRuleName
 from hyuav.physics.scenario import Scenario
-
-
-@dataclass(frozen=True)
-class Learner(Parameters):
-    """What distinguishes one learner from another.
-
-    All its random numbers come from its seed: initial weights, exploration, fading, sampling. So
-    it learns the same alone and among others, and learners of equal seeds that differ in scheme
-    or horizon begin with the same weights and meet the same fading.
-    """
-
-    scheme: ModeRuleName = parameter("hybrid")
-    seed: CountOrZero = parameter(0)
-    num_slots: Count | None = parameter(None, symbol="T")
-    """The horizon; the scenario's where it is None."""
-
-    def horizon(self, scenario: Scenario) -> int:
-        """T: its own, or else the scenario's."""
-        return self.num_slots or scenario.num_slots
 
 
 class Cohort:

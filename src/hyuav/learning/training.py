@@ -33,10 +33,10 @@ from hyuav.envs.rewards import SUM_RATE, as_reward
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.checkpoint import require_entries, require_like
 from hyuav.learning.compile import FlownEpisode
-from hyuav.learning.learners import as_learners
+from hyuav.learning.learners import Learner, as_learners
 from hyuav.learning.memory import require_memory
 from hyuav.learning.policy import NoiseFreeReturn, Policy, learned_policy
-from hyuav.learning.train import Cohort, Learner
+from hyuav.learning.train import Cohort
 from hyuav.learning.weights import count_learners, join_learners, load_weights, select_learners
 from hyuav.physics.generators import LayoutGenerator, over_horizon
 from hyuav.physics.scenario import ScenarioLike, as_scenario

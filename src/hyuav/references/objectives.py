@@ -11,8 +11,9 @@ from hyuav.envs.reward import EPISODE, VELOCITY, Reward
 from hyuav.envs.rewards import DEFAULT
 from hyuav.physics.channel import Links
 from hyuav.physics.modes import ModeRule
+from hyuav.physics.outcome import Control, SlotOutcome
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import Control, Physics, SlotOutcome, chosen
+from hyuav.physics.slot import Physics, chosen
 from hyuav.physics.tasks import Tasks
 from hyuav.references.rewards import is_random, stratified_fading, tasks_of
 

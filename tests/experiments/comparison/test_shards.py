@@ -20,9 +20,9 @@ from hyuav.experiments.evaluation import EvaluationParameters, fly
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters, Tracker
 from hyuav.experiments.train import train
+from hyuav.learning.learners import Learner
 from hyuav.learning.policy import learned_policy
 from hyuav.learning.registry import PEER
-from hyuav.learning.train import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.references.optimum import solve_optimum
 

@@ -13,7 +13,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import EvaluationLoggerParameters, LoggerParameters, log_evaluation
 from hyuav.experiments.train import train
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.references.straight import re_lt
 from offline_wandb import history, offline_runs, recorded, summary

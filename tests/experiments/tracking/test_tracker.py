@@ -20,7 +20,7 @@ from hyuav.experiments.tracking.checkpoints import restore
 from hyuav.experiments.tracking.memory import remembered
 from hyuav.learning.checkpoint import load_checkpoint
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import Training, TrainingParameters
 from offline_wandb import (
     history,

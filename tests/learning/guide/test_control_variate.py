@@ -10,8 +10,9 @@ from hyuav import Guide, RobustDDPG, Scenario
 from hyuav.learning.afterstate import Afterstate
 from hyuav.learning.algorithm import adam
 from hyuav.learning.guide.control_variate import CONTROL_TERM, ControlVariate
+from hyuav.learning.learners import Learner
 from hyuav.learning.replay import FADING
-from hyuav.learning.train import Cohort, Learner
+from hyuav.learning.train import Cohort
 from hyuav.physics.slot import Physics
 from reference import hover
 

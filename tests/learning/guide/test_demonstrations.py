@@ -9,8 +9,9 @@ from hyuav import Guide, InputError, RobustDDPG, Scenario
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.demonstrations import Demonstrations
 from hyuav.learning.guide.planner import Planner
+from hyuav.learning.learners import Learner
 from hyuav.learning.replay import latest
-from hyuav.learning.train import Cohort, Learner
+from hyuav.learning.train import Cohort
 from hyuav.learning.training import Training, TrainingParameters
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)

@@ -13,7 +13,8 @@ from hyuav.learning.guide.demonstrations import Demonstrations
 from hyuav.learning.guide.parameters import OFF
 from hyuav.learning.guide.planner import Planner
 from hyuav.learning.guide.reward_model import RewardModel
-from hyuav.learning.train import Cohort, Learner
+from hyuav.learning.learners import Learner
+from hyuav.learning.train import Cohort
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=6)
 GUIDE = Guide(warm_up_episodes=3)

@@ -16,7 +16,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import train
 from hyuav.learning.ddpg import DDPG
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.viz.data.runs import AS_IN_PAPER
 from hyuav.viz.paper.gallery import FIGURES, draw

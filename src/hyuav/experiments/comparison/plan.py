@@ -32,8 +32,8 @@ from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.parameters import OFF
 from hyuav.learning.guide.robust import Robust
+from hyuav.learning.learners import Learner
 from hyuav.learning.registry import ALGORITHMS, PEER
-from hyuav.learning.train import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
 from hyuav.physics.modes import MODE_RULES, ModeRuleName

@@ -14,8 +14,8 @@ from hyuav.experiments.comparison.plan import training_episodes
 from hyuav.experiments.evaluation import EvaluationParameters, fly
 from hyuav.experiments.run_directory import RunConfiguration
 from hyuav.experiments.schemes import LEARNED
+from hyuav.learning.learners import Learner
 from hyuav.learning.policy import Policy
-from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
 
 

@@ -18,7 +18,7 @@ from hyuav.experiments.tracking.checkpoints import Reported, save_checkpoints
 from hyuav.experiments.tracking.logged_run import Job, Metric
 from hyuav.experiments.tracking.parameters import LoggerParameters
 from hyuav.experiments.tracking.session import Session
-from hyuav.learning.train import Learner
+from hyuav.learning.learners import Learner
 from hyuav.learning.training import Episode, Training
 
 _IDENTITY = ("episode", "slots", "learner", "scheme", "seed", "num_slots", "seconds")

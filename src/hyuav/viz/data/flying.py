@@ -16,8 +16,8 @@ from hyuav.experiments.policies import (
 )
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
+from hyuav.learning.learners import Learner
 from hyuav.learning.policy import Policy
-from hyuav.learning.train import Learner
 from hyuav.physics.scenario import Scenario
 from hyuav.references.flight import FlightPolicy
 from hyuav.references.optimum import RESOLUTION, Optimum, solve_optimum

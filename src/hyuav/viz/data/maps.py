@@ -7,8 +7,9 @@ import pandas as pd
 import torch
 from numpy.typing import NDArray
 
+from hyuav.physics.outcome import Control
 from hyuav.physics.scenario import Scenario
-from hyuav.physics.slot import Control, Physics, slot
+from hyuav.physics.slot import Physics, slot
 from hyuav.physics.tasks import mean_tasks
 
 Mode = Literal["relay", "jamming", "better"]
