@@ -30,7 +30,7 @@ def test_learners_may_be_told_by_count_or_seeds(said: str) -> None:
 @pytest.mark.parametrize(
     ("place", "value", "line"),
     [
-        (0, {"a": 1}, "scenario = {'a': 1}: expected a Scenario or a preset's name"),
+        (0, {"a": 1}, "scenario = {'a': 1}: expected a Scenario, a preset's name or UE positions"),
         (1, 0, "learners = 0: expected a whole number >= 1"),
         (1, [], r"learners = \[\]: expected a list of at least one Learner or seed"),
         (1, "x", "learners = 'x': expected a list of at least one Learner or seed"),

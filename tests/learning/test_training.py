@@ -242,7 +242,7 @@ def test_a_mini_batch_larger_than_the_replay_is_refused() -> None:
         TrainingParameters(replay_size=20, batch_size=30)
 
 
-@pytest.mark.parametrize("learners", ["hybrid", [], ["hybrid"], Learner()])
+@pytest.mark.parametrize("learners", ["hybrid", [], ["hybrid"], 1.5])
 def test_learners_are_a_list_of_learners(learners: Any) -> None:
     with pytest.raises(InputTypeError, match=r"learners = [^\n]*: expected a list"):
         Training(SCENARIO, learners, ALGORITHMS["ddpg"](), SHORT)
