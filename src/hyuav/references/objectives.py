@@ -1,6 +1,5 @@
 """Expected rewards of one helper by an objective of one's own."""
 
-import math
 from collections.abc import Sequence
 
 import torch
@@ -15,10 +14,16 @@ from hyuav.physics.outcome import Control, SlotOutcome
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics, chosen
 from hyuav.physics.tasks import Tasks
-from hyuav.references.rewards import is_random, stratified_fading, tasks_of
-
-_CHUNK = 2**19
-"""Links computed at once: few enough for the cache, enough to outweigh PyTorch's overhead."""
+from hyuav.references.rewards import (
+    CHUNK,
+    episodes,
+    geometry_of,
+    is_random,
+    mean_with_error,
+    nodes_of,
+    stratified_fading,
+    tasks_of,
+)
 
 _SLOTS, _VELOCITIES = 2**10, 2**7
 """Computed at once where rewards depend on the velocity: their product fits the cache, and slots
@@ -80,7 +85,7 @@ def reward_maps(
     # NaN where it does not matter, so that it is found out if it does.
     ways = positions.new_full((1, 2), torch.nan) if velocities is None else velocities
     maps = positions.new_empty(len(mode_rules), len(ways), len(positions))
-    per_chunk = _CHUNK // physics.scenario.num_ues if velocities is None else _SLOTS
+    per_chunk = CHUNK // physics.scenario.num_ues if velocities is None else _SLOTS
     chunk = max(per_chunk // draws, 1)
     for part, found in zip(positions.split(chunk), maps.split(chunk, dim=-1), strict=True):
         shape = (len(part), draws)
@@ -114,22 +119,13 @@ def estimate_objective(
         generator: of the draws.
         reward: what a slot earns.
     """
-    num_slots = len(path) - 1
-    draws = draws if is_random(physics) else 1
-    chunk = max(_CHUNK // (num_slots * physics.scenario.num_ues), 1)
     velocity = path.diff(dim=0) / physics.scenario.slot_duration
     returns = []
-    for first in range(0, draws, chunk):
-        shape = (min(chunk, draws - first), num_slots)
-        row = physics.draw_fading(shape, generator)
-        fading = None if row is None else physics.link_row.unflatten(row)
-        tasks = tasks_of(physics, shape, generator)
+    for shape, fading, tasks in episodes(physics, len(path) - 1, draws, generator):
         outcome = _slots(physics, path[1:], shape, fading, tasks, mode_rule)
         outcome = outcome._replace(control=outcome.control._replace(velocity=velocity))
         returns.append(reward.of(outcome).squeeze(-1).expand(shape).sum(dim=-1))
-    episodes = torch.cat(returns)
-    error = float(episodes.std()) / math.sqrt(draws) if draws > 1 else 0.0
-    return float(episodes.mean()), error
+    return mean_with_error(returns)
 
 
 def _slots(
@@ -150,17 +146,11 @@ def _slots(
         tasks: (*shape, U).
         mode_rule: who chooses the mode.
     """
-    if fading is None:  # Otherwise the fading brings its shape to all that follows.
-        position = position.expand(*shape, *position.shape[-2:])
-    nodes = physics.nodes._replace(helper=position)
-    geometry = physics.geometry(nodes)
-    gains = geometry.gains.faded(fading)
-    # A UE at D_max is covered (eq. 5), also where float64 puts a grid point just beyond.
-    closing = 1e-12 * physics.scenario.map_side
-    geometry = geometry._replace(ue_to_helper=geometry.ue_to_helper - closing)
+    nodes = nodes_of(physics, position, shape, fading)
+    geometry, gains = geometry_of(physics, nodes, fading)
     flags = ModeRule.of([mode_rule], physics.scenario.num_helpers)
     rule = ModeRule(*(torch.as_tensor(own)[0] for own in flags))
-    control = Control(torch.full_like(position, torch.nan), rule)
-    on_map = torch.zeros_like(position[..., 0], dtype=torch.bool)
+    control = Control(torch.full_like(nodes.helper, torch.nan), rule)
+    on_map = torch.zeros_like(nodes.helper[..., 0], dtype=torch.bool)
     outcomes = physics.outcomes(geometry, gains, tasks)
     return chosen(physics, nodes, control, on_map, geometry.distances, outcomes)

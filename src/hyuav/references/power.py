@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from hyuav.physics.scenario import Scenario
-from hyuav.references.rewards import ExpectedReward
+from hyuav.references.rewards import ExpectedReward, is_random
 
 NEAR = 2.0
 """How far in dB from the best level without fading the best one with fading is sought."""
@@ -60,7 +60,7 @@ def best_levels(
     for number, level in enumerate(levels):
         power[:, helper] = level
         _keep(best, index, quiet(mode_rules, places, power), places.new_tensor(number))
-    if expected is quiet:
+    if expected is quiet or not is_random(quiet.physics):
         return best, levels[index.long()]
     near = max(round(NEAR / step), 1)
     first = index.clone()

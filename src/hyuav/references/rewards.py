@@ -1,17 +1,18 @@
 """Expected rewards over fading and tasks, by Monte Carlo; exact where a slot is not random."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import torch
 from torch import Tensor
 
 from hyuav.physics.channel import Links
+from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import allowed_vectors
-from hyuav.physics.slot import Physics
+from hyuav.physics.slot import Geometry, Physics
 from hyuav.physics.tasks import Tasks, draw_tasks
 
-_CHUNK = 2**19
+CHUNK = 2**19
 """Links computed at once: few enough for the cache, enough to outweigh PyTorch's overhead."""
 
 _STRATUM = 64
@@ -47,20 +48,18 @@ class ExpectedReward:
         scenario = self.physics.scenario
         means = torch.empty(len(mode_rules), len(places), dtype=places.dtype, device=places.device)
         several = 4 ** (scenario.num_helpers - 1)
-        chunk = max(_CHUNK // (self._draws * scenario.num_ues * several), 1)
+        chunk = max(CHUNK // (self._draws * scenario.num_ues * several), 1)
         parts = places.split(chunk)
-        powers = [None] * len(parts) if power is None else power.split(chunk)
-        for part, own, out in zip(parts, powers, means.split(chunk, dim=1), strict=True):
-            rewards = rewards_of(
-                self.physics,
-                mode_rules,
-                part.unsqueeze(1),
-                (len(part), self._draws),
-                self._fading,
-                self._tasks,
-                None if own is None else own.unsqueeze(1),
-            )
-            torch.mean(rewards, dim=-1, out=out)
+        powers = [None] * len(parts) if power is None else power.unsqueeze(1).split(chunk)
+        allowed = [allowed_vectors(rule, scenario.num_helpers) for rule in mode_rules]
+        vectors = sorted({vector for own in allowed for vector in own})
+        for part, own_power, out in zip(parts, powers, means.split(chunk, dim=1), strict=True):
+            shape = len(part), self._draws
+            drawn = self._fading, self._tasks
+            sums = sum_rates(self.physics, vectors, part.unsqueeze(1), shape, *drawn, own_power)
+            for own, mean in zip(allowed, out, strict=True):
+                best = sums.amax(dim=0) if len(own) > 1 else sums[vectors.index(own[0])]
+                torch.mean(best, dim=-1, out=mean)
         return means
 
 
@@ -86,44 +85,47 @@ def estimate_return(
         the mean return and its standard error in bps/Hz, and the modes (T, H) int64 (1
         relay, 0 jamming) that the mode rule takes by what each brings in the mean.
     """
-    scenario, num_slots = physics.scenario, len(path) - 1
-    draws = draws if is_random(physics) else 1
-    vectors = allowed_vectors(mode_rule, scenario.num_helpers)
-    chunk = max(_CHUNK // (num_slots * scenario.num_ues), 1)
+    num_slots = len(path) - 1
+    vectors = allowed_vectors(mode_rule, physics.scenario.num_helpers)
     total = torch.zeros(len(vectors), num_slots, dtype=path.dtype, device=path.device)
     returns = []
+    for shape, fading, tasks in episodes(physics, num_slots, draws, generator):
+        sums = sum_rates(physics, vectors, path[1:], shape, fading, tasks, power)
+        total += sums.sum(dim=1)
+        returns.append(sums.amax(dim=0).sum(dim=-1))
+    best = total.max(dim=0).indices  # of equals the first
+    modes = torch.tensor(vectors, dtype=torch.int64, device=path.device)
+    return *mean_with_error(returns), modes[best]
+
+
+def episodes(
+    physics: Physics, num_slots: int, draws: int, generator: torch.Generator
+) -> Iterator[tuple[tuple[int, int], Links | None, Tasks | None]]:
+    """The fading and the tasks of whole episodes, as many at once as the cache holds.
+
+    Args:
+        physics: in float64.
+        num_slots: T.
+        draws: how many episodes; where no slot is random, one.
+        generator: of the draws.
+
+    Yields:
+        the shape (episodes, T), the fading of their links, and their tasks.
+    """
+    draws = draws if is_random(physics) else 1
+    chunk = max(CHUNK // (num_slots * physics.scenario.num_ues), 1)
     for first in range(0, draws, chunk):
         shape = (min(chunk, draws - first), num_slots)
         row = physics.draw_fading(shape, generator)
         fading = None if row is None else physics.link_row.unflatten(row)
-        tasks = tasks_of(physics, shape, generator)
-        sums = sum_rates(physics, vectors, path[1:], shape, fading, tasks, power)
-        total += sums.sum(dim=1)
-        returns.append(sums.amax(dim=0).sum(dim=-1))
-    episodes = torch.cat(returns)
-    error = float(episodes.std()) / math.sqrt(draws) if draws > 1 else 0.0
-    best = total.max(dim=0).indices  # of equals the first
-    modes = torch.tensor(vectors, dtype=torch.int64, device=path.device)
-    return float(episodes.mean()), error, modes[best]
+        yield shape, fading, tasks_of(physics, shape, generator)
 
 
-def rewards_of(
-    physics: Physics,
-    mode_rules: Sequence[str],
-    position: Tensor,
-    shape: tuple[int, ...],
-    fading: Links | None,
-    tasks: Tasks | None,
-    power: Tensor | None = None,
-) -> Tensor:
-    """Rewards under each mode rule; the rest as for :func:`sum_rates`: (rules, *shape) bps/Hz."""
-    num_helpers = physics.scenario.num_helpers
-    allowed = [allowed_vectors(rule, num_helpers) for rule in mode_rules]
-    vectors = sorted({vector for own in allowed for vector in own})
-    sums = sum_rates(physics, vectors, position, shape, fading, tasks, power)
-    return torch.stack(
-        [sums.amax(dim=0) if len(own) > 1 else sums[vectors.index(own[0])] for own in allowed]
-    )
+def mean_with_error(returns: Sequence[Tensor]) -> tuple[float, float]:
+    """The mean of episodes' returns, given in parts, and its standard error; 0 of a single one."""
+    of_all = torch.cat([*returns])
+    error = float(of_all.std()) / math.sqrt(len(of_all)) if len(of_all) > 1 else 0.0
+    return float(of_all.mean()), error
 
 
 def sum_rates(
@@ -146,15 +148,30 @@ def sum_rates(
         tasks: of the UEs.
         power: (*shape, H) likewise, in units of the nominal power; None for that.
     """
-    if fading is None:  # Otherwise the fading brings its shape to all that follows.
-        position = position.expand(*shape, *position.shape[-2:])
-    geometry = physics.geometry(physics.nodes._replace(helper=position))
-    gains = geometry.gains.faded(fading)
-    # A UE at D_max is covered (eq. 5), also where float64 puts a grid point just beyond.
-    closing = 1e-12 * physics.scenario.map_side
-    geometry = geometry._replace(ue_to_helper=geometry.ue_to_helper - closing)
+    nodes = nodes_of(physics, position, shape, fading)
+    geometry, gains = geometry_of(physics, nodes, fading)
     outcomes = physics.outcomes(geometry, gains, tasks, power, vectors)
     return torch.stack([outcome.sum_rate.expand(shape) for outcome in outcomes])
+
+
+def nodes_of(
+    physics: Physics, position: Tensor, shape: tuple[int, ...], fading: Links | None
+) -> Nodes:
+    """All nodes of slots (*shape), with the helpers where ``position`` broadcasts to, in m."""
+    if fading is None:  # Otherwise the fading brings its shape to all that follows.
+        position = position.expand(*shape, *position.shape[-2:])
+    return physics.nodes._replace(helper=position)
+
+
+def geometry_of(physics: Physics, nodes: Nodes, fading: Links | None) -> tuple[Geometry, Links]:
+    """The geometry of slots, and the gains of their links with fading.
+
+    A UE at D_max is covered (eq. 5), also where float64 puts a grid point just beyond.
+    """
+    geometry = physics.geometry(nodes)
+    closing = 1e-12 * physics.scenario.map_side
+    covering = geometry._replace(ue_to_helper=geometry.ue_to_helper - closing)
+    return covering, geometry.gains.faded(fading)
 
 
 def is_random(physics: Physics) -> bool:
