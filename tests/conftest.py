@@ -18,7 +18,7 @@ from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evalu
 from hyuav.references.flight import FlightPolicy
 from hyuav.references.optimum import solve_optimum
 from hyuav.references.straight import ja_lt, re_lt
-from recipe_calls import Call, Refusal
+from recipe_calls import Call, Refusal, forget_own
 
 RECIPES = Path(__file__).parents[1] / "recipes"
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "__main__.py"
@@ -96,6 +96,7 @@ def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Call]:
 
     yield run
     torch.set_num_threads(1)
+    forget_own()
 
 
 @pytest.fixture

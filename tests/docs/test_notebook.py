@@ -22,6 +22,7 @@ def test_it_runs_from_top_to_bottom(
     kept: nbformat.NotebookNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HYUAV_NOTEBOOK_EPISODES", "4")
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # Streamlit, once imported, sets it
     scripts = str(Path(sys.executable).parent)  # where the command is
     monkeypatch.setenv("PATH", os.pathsep.join([scripts, os.environ["PATH"]]))
     resources = {"metadata": {"path": str(tmp_path)}}

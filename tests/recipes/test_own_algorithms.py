@@ -1,7 +1,5 @@
 """A user's own algorithm, named where it is used: FILE.py:CLASS."""
 
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
@@ -9,8 +7,7 @@ import pytest
 
 from hyuav import InputError, load
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.learning.registry import ALGORITHMS
-from recipe_calls import TINY, TINY_COMPARISON, Call, Refusal
+from recipe_calls import TINY, TINY_COMPARISON, Call, Refusal, forget_own
 
 PROGRAM = """
 from pydantic.dataclasses import dataclass
@@ -25,18 +22,12 @@ class Own(DDPG):
 SHORT = [*TINY, "training.compile=never", "scenario.num_slots=6"]
 
 
-def forget() -> None:
-    ALGORITHMS.pop("own.py:Own", None)
-    sys.modules.pop("hyuav_own_own", None)
-
-
 @pytest.fixture(autouse=True)
-def own(tmp_path: Path) -> Iterator[str]:
+def own(tmp_path: Path) -> str:
     """The file that is named, which no test before has run."""
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "own.py").write_text(PROGRAM)
-    yield "mine/own.py:Own"
-    forget()
+    return "mine/own.py:Own"
 
 
 def test_it_trains_and_is_named_again_to_go_on_and_to_be_evaluated(
@@ -48,7 +39,7 @@ def test_it_trains_and_is_named_again_to_go_on_and_to_be_evaluated(
     configuration = RunDirectory(run).configuration()
     assert configuration.algorithm_name == "own.py:Own"
     assert configuration.algorithm.to_dict()["boldness"] == 3.0
-    forget()
+    forget_own()
     (tmp_path / "own.py").write_text("raise SystemExit('it was run')\n")
     path, few = str(run.relative_to(tmp_path)), ["evaluation.episodes=4"]
     few += ["evaluation.resolution=10"]
@@ -58,7 +49,7 @@ def test_it_trains_and_is_named_again_to_go_on_and_to_be_evaluated(
     call("train", f"resume={path}", f"algorithm={own}")
     call("evaluate", f"run={path}", f"algorithm={own}", *few)
     assert (run / "evaluation.json").exists()
-    forget()
+    forget_own()
     with pytest.raises(InputError, match=asked):
         load(run)
     policy = load(run, algorithm=str(tmp_path / own)).policy

@@ -1,17 +1,14 @@
 """A reward of one's own, named where it is used, or one that comes with the package."""
 
 import json
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 
-from hyuav.envs.rewards import REWARDS
 from hyuav.experiments.run_directory import RunDirectory
-from recipe_calls import TINY, TINY_COMPARISON, Call, Refusal
+from recipe_calls import TINY, TINY_COMPARISON, Call, Refusal, forget_own
 
 PROGRAM = """
 from hyuav import Reward
@@ -31,19 +28,12 @@ SHORT = [*TINY, "training.compile=never", "scenario.num_slots=6"]
 FEW = ["evaluation.episodes=4", "evaluation.resolution=20"]
 
 
-def forget() -> None:
-    for name in [name for name in REWARDS if ".py:" in name]:
-        del REWARDS[name]
-    sys.modules.pop("hyuav_own_mine", None)
-
-
 @pytest.fixture(autouse=True)
-def own(tmp_path: Path) -> Iterator[str]:
+def own(tmp_path: Path) -> str:
     """The file that is named, which no test before has run."""
     (tmp_path / "my").mkdir()
     (tmp_path / "my" / "mine.py").write_text(PROGRAM)
-    yield "my/mine.py:served"
-    forget()
+    return "my/mine.py:served"
 
 
 def summary(directory: Path) -> dict[str, Any]:
@@ -62,7 +52,7 @@ def test_it_trains_and_is_named_again_to_go_on_and_to_be_evaluated(
     assert "accumulated reward (share of UEs): " in capsys.readouterr().out
     (run,) = (tmp_path / "runs").iterdir()
     assert RunDirectory(run).configuration().reward.unit == "share of UEs"
-    forget()
+    forget_own()
     path = str(run.relative_to(tmp_path))
     asked = "expected a reward of a file that you name: reward=DIRECTORY/mine.py:served"
     for recipe, name in (("train", "resume"), ("evaluate", "run"), ("draw", "run")):
