@@ -141,7 +141,7 @@ def test_slots_are_those_of_scalar_loops(
     fading = physics.draw_fading((), generator)
     tasks = draw_tasks(scenario, (), generator, torch.float64)
     nodes = physics.nodes._replace(helper=torch.tensor(places, dtype=torch.float64))
-    rule = ModeRule(*(torch.as_tensor(flags)[0] for flags in ModeRule.of([scheme], count)))
+    rule = ModeRule.of([scheme], count).each(torch.squeeze)
     staying = torch.zeros(count, 2, dtype=torch.float64)
     control = Control(staying, rule, torch.tensor(power, dtype=torch.float64))
     links = None if fading is None else physics.link_row.unflatten(fading)

@@ -137,9 +137,7 @@ class SecureOffloadingEnv(EnvBase):
         beside = () if self.reward == DEFAULT else (SUM_RATE,)
         self._entries = tuple(dict.fromkeys((*entries, *beside)))
         rules = ModeRule.of(self.schemes, self.scenario.num_helpers, self.device)
-        self._mode_rule = ModeRule(
-            *(self._per_row(torch.as_tensor(flags, device=self.device)) for flags in rules)
-        )
+        self._mode_rule = rules.each(self._per_row)
         norm_limit = self.physics.norm_limit(self.schemes)
         self._norm_limit = None
         if norm_limit is not None:

@@ -43,16 +43,28 @@ class Links(NamedTuple):
             return self
         return Links(*(gain * power for gain, power in zip(self, fading, strict=True)))
 
-    def between_helpers(self, helper: int) -> Tensor:
-        """The numbers of one helper's links to all helpers, 0 for itself: (..., H, 1)."""
-        num_helpers = self.helper_legitimate.shape[-1]
-        own = torch.zeros_like(self.helper_legitimate[..., :1])
-        numbers = dict(zip(pairs(num_helpers), self.helper_helper.split(1, dim=-1), strict=True))
-        others = [
-            own if other == helper else numbers[min(helper, other), max(helper, other)]
-            for other in range(num_helpers)
+    @property
+    def to_legitimate(self) -> tuple[Tensor, ...]:
+        """The numbers of each helper's link to the legitimate UAV: H of (..., 1)."""
+        return self.helper_legitimate.split(1, dim=-1)
+
+    @property
+    def to_eavesdroppers(self) -> tuple[Tensor, ...]:
+        """The numbers of each helper's links to the eavesdroppers: H of (..., E)."""
+        return self.helper_eavesdropper.unbind(dim=-2)
+
+    def between_helpers(self, helper: int) -> list[Tensor]:
+        """The numbers of one helper's links to each helper, 0 for itself: H of (..., 1)."""
+        own = self.to_legitimate[helper]
+        numbers = dict(
+            zip(pairs(len(self.to_legitimate)), self.helper_helper.split(1, dim=-1), strict=True)
+        )
+        return [
+            torch.zeros_like(own)
+            if other == helper
+            else numbers[min(helper, other), max(helper, other)]
+            for other in range(len(self.to_legitimate))
         ]
-        return torch.stack(others, dim=-2)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """In which modes the helpers work: the argmax of Algorithm 1, over all that they can do."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Annotated, NamedTuple
 
@@ -21,29 +21,32 @@ def mode_vectors(num_helpers: int) -> tuple[tuple[bool, ...], ...]:
 
 
 class ModeRule(NamedTuple):
-    """Which modes may be chosen, of those that :func:`mode_vectors` lists."""
+    """Which modes may be chosen, of those that :func:`mode_vectors` lists; by default any."""
 
-    allowed: Tensor | bool = True
-    """(..., 2^H) bool, or of all: whether the modes may be chosen at all."""
-    forced: Tensor | bool = False
-    """(..., 2^H) bool, or of all: whether they are the first that may be."""
+    allowed: tuple[Tensor, ...] | None = None
+    """Whether each of them may be chosen at all: 2^H of (..., 1) bool, or None where all may."""
+    forced: tuple[Tensor, ...] = ()
+    """Whether each of them is the first that may be, likewise."""
 
     @classmethod
     def of(
         cls, names: Sequence[str], num_helpers: int, device: torch.device | str | None = None
     ) -> "ModeRule":
-        """The rules of these names, as :func:`fixed_modes` reads them: flags (len(names), 2^H)."""
+        """The rules of these names, as :func:`fixed_modes` reads them: flags (len(names), 1)."""
         modes = mode_vectors(num_helpers)
         of_names = [allowed_vectors(name, num_helpers) for name in names]
+        if all(own == modes for own in of_names):
+            return cls()
         allowed = torch.tensor([[mode in own for mode in modes] for own in of_names], device="cpu")
         first = allowed & (allowed.cumsum(dim=-1) == 1)
-        return cls(allowed.to(device), first.to(device))
+        return cls(*(flags.to(device).split(1, dim=-1) for flags in (allowed, first)))
 
-    def of_mode(self, number: int) -> tuple[Tensor | bool, Tensor | bool]:
-        """Both flags of one of the modes, (..., 1) each."""
-        of = slice(number, number + 1)
-        allowed, forced = (flags if isinstance(flags, bool) else flags[..., of] for flags in self)
-        return allowed, forced
+    def each(self, change: Callable[[Tensor], Tensor]) -> "ModeRule":
+        """With flags of another shape."""
+        if self.allowed is None:
+            return self
+        allowed, forced = (tuple(map(change, flags)) for flags in (self.allowed, self.forced))
+        return ModeRule(allowed, forced)
 
 
 MODE_RULES = ("hybrid", "relay", "jamming")
@@ -103,5 +106,7 @@ def beats(sum_rate: Tensor, best: Tensor, rule: ModeRule, mode: int) -> Tensor:
         rule: that decides which are.
         mode: the number of this one.
     """
-    allowed, forced = rule.of_mode(mode)
-    return ((sum_rate > best) | forced) & allowed
+    better = sum_rate > best
+    if rule.allowed is None:
+        return better
+    return (better | rule.forced[mode]) & rule.allowed[mode]

@@ -42,10 +42,18 @@ class Sent(NamedTuple):
 
     ue: float
     """p_u / sigma^2."""
-    relay: Tensor
-    """p_i / sigma^2 of each helper where it relays: (..., H)."""
-    jamming: Tensor
-    """p_j / sigma^2 of each helper where it jams: (..., H)."""
+    relay: Sequence[Tensor | float]
+    """p_i / sigma^2 of each helper where it relays: H of (..., 1), or of all."""
+    jamming: Sequence[Tensor | float]
+    """p_j / sigma^2 of each helper where it jams, likewise."""
+
+    def scaled(self, power: Sequence[Tensor]) -> "Sent":
+        """With each helper's power (..., 1) in units of the nominal power of its mode."""
+        relay, jamming = (
+            [nominal * own for nominal, own in zip(of_mode, power, strict=True)]
+            for of_mode in (self.relay, self.jamming)
+        )
+        return Sent(self.ue, relay, jamming)
 
 
 def straight_rates(
@@ -61,8 +69,8 @@ def straight_rates(
         jammers: the helpers that jam, at least one, counted from 0.
         eavesdroppers: as for :func:`overheard`.
     """
-    at_legitimate = sent.ue / _noise(sent, jammers, gains.helper_legitimate.unsqueeze(-1))
-    at_eavesdroppers = sent.ue / _noise(sent, jammers, gains.helper_eavesdropper).unsqueeze(-2)
+    at_legitimate = sent.ue / _noise(sent, jammers, gains.to_legitimate)
+    at_eavesdroppers = sent.ue / _noise(sent, jammers, gains.to_eavesdroppers).unsqueeze(-2)
     return AchievableRates(
         at_legitimate * gains.ue_legitimate,
         overheard(at_eavesdroppers * gains.ue_eavesdropper, eavesdroppers),
@@ -82,22 +90,20 @@ def relay_rates(
         jammers: the helpers that jam meanwhile.
         eavesdroppers: as for :func:`overheard`.
     """
-    own = sent.relay[..., relay : relay + 1]
-    to_legitimate = own * gains.helper_legitimate[..., relay : relay + 1]
-    to_eavesdroppers = own * gains.helper_eavesdropper[..., relay, :]
-    combined = to_legitimate + sent.ue * gains.ue_legitimate
-    decoded = sent.ue * gains.ue_helper[..., relay]
-    heard = to_eavesdroppers.unsqueeze(-2) + sent.ue * gains.ue_eavesdropper
+    own = sent.relay[relay]
+    combined = own * gains.to_legitimate[relay] + sent.ue * gains.ue_legitimate
+    decoded = sent.ue * gains.ue_helper.select(-1, relay)
+    heard = (own * gains.to_eavesdroppers[relay]).unsqueeze(-2) + sent.ue * gains.ue_eavesdropper
     if jammers:
-        combined = combined / _noise(sent, jammers, gains.helper_legitimate.unsqueeze(-1))
+        combined = combined / _noise(sent, jammers, gains.to_legitimate)
         decoded = decoded / _noise(sent, jammers, gains.between_helpers(relay))
-        heard = heard / _noise(sent, jammers, gains.helper_eavesdropper).unsqueeze(-2)
+        heard = heard / _noise(sent, jammers, gains.to_eavesdroppers).unsqueeze(-2)
     return AchievableRates(torch.minimum(combined, decoded), overheard(heard, eavesdroppers), 0.5)
 
 
-def _noise(sent: Sent, jammers: Sequence[int], gains: Tensor) -> Tensor:
-    """Noise and jamming in units of sigma^2, from the helpers' gains (..., H, k): (..., k)."""
-    received = [sent.jamming[..., j : j + 1] * gains[..., j, :] for j in jammers]
+def _noise(sent: Sent, jammers: Sequence[int], gains: Sequence[Tensor]) -> Tensor:
+    """Noise and jamming in units of sigma^2, from the gains of each helper (..., k): (..., k)."""
+    received = [sent.jamming[jammer] * gains[jammer] for jammer in jammers]
     return reduce(torch.add, received) + 1.0
 
 

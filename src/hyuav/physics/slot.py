@@ -102,12 +102,9 @@ class Physics:
 
     def _nominal(self) -> rates.Sent:
         scenario = self.scenario
-        helpers = torch.ones(scenario.num_helpers, dtype=self.dtype, device=self.device)
-        return rates.Sent(
-            scenario.ue_power / scenario.noise_power,
-            helpers * (scenario.relay_power / scenario.noise_power),
-            helpers * (scenario.jamming_power / scenario.noise_power),
-        )
+        powers = scenario.ue_power, scenario.relay_power, scenario.jamming_power
+        ue, relay, jamming = (power / scenario.noise_power for power in powers)
+        return rates.Sent(ue, (relay,) * scenario.num_helpers, (jamming,) * scenario.num_helpers)
 
     def _stand(self, nodes: Nodes) -> StandingNodes:
         scenario, ues = self.scenario, nodes.ue
@@ -238,7 +235,7 @@ class Physics:
         """
         sent = self._sent
         if power is not None:
-            sent = rates.Sent(sent.ue, sent.relay * power, sent.jamming * power)
+            sent = sent.scaled(power.split(1, dim=-1))
         asked = modes.mode_vectors(self.scenario.num_helpers) if vectors is None else vectors
         return tuple(self._outcome(geometry, gains, sent, relays, tasks) for relays in asked)
 

@@ -148,8 +148,7 @@ def _slots(
     """
     nodes = nodes_of(physics, position, shape, fading)
     geometry, gains = geometry_of(physics, nodes, fading)
-    flags = ModeRule.of([mode_rule], physics.scenario.num_helpers)
-    rule = ModeRule(*(torch.as_tensor(own)[0] for own in flags))
+    rule = ModeRule.of([mode_rule], physics.scenario.num_helpers).each(torch.squeeze)
     control = Control(torch.full_like(nodes.helper, torch.nan), rule)
     on_map = torch.zeros_like(nodes.helper[..., 0], dtype=torch.bool)
     outcomes = physics.outcomes(geometry, gains, tasks)
