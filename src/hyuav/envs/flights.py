@@ -3,7 +3,8 @@
 import copy
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from inspect import signature
 from types import FrameType
 from typing import Any
 
@@ -22,6 +23,7 @@ from hyuav._support.errors import InputError, InputTypeError, rejection, require
 from hyuav._support.parameters import Count, checked, plain
 from hyuav.envs.recorder import FlightRecorder
 from hyuav.envs.rewards import sum_rate_of
+from hyuav.envs.transforms import make_env
 from hyuav.physics.generators import LayoutGenerator, over_horizon
 from hyuav.physics.scenario import Scenario, as_scenario, is_layout
 
@@ -199,6 +201,18 @@ def accepted_options(options: object, names: Sequence[str]) -> Mapping[str, Any]
     for name in options:
         require_choice("reset option", name, names)
     return options
+
+
+def require_options(options: Iterable[str]) -> None:
+    """Accept what :func:`hyuav.make_env` takes and the environments here do not set themselves.
+
+    Raises:
+        InputError: naming another.
+    """
+    own = ("scenario", "scheme", "batch_size", "device", "seed", "agents")
+    known = [name for name in signature(make_env).parameters if name not in own]
+    for name in options:
+        require_choice("option", name, known)
 
 
 def with_masks(entries: Mapping[str, Any], rows: Flags) -> dict[str, Any]:
