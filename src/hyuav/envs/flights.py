@@ -14,7 +14,7 @@ import torch
 from gymnasium.envs import registration
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
-from gymnasium.spaces import Box, Space
+from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 from tensordict import TensorDict, TensorDictBase
 from torchrl.envs import TransformedEnv
@@ -63,7 +63,7 @@ class Flights:
             raise ResetNeeded("call reset() before step() and render()")
         return self._state
 
-    def spaces(self) -> tuple[Space[Any], Space[Any]]:
+    def spaces(self) -> tuple[Box[np.float32], Box[np.float32]]:
         """One helper's observation and action space.
 
         A distance is at most the map's diagonal, sqrt(8) of the half sides it is measured in.
@@ -87,8 +87,8 @@ class Flights:
         if position is not None:
             one = (2,) if self.scenario.num_helpers == 1 else tuple(start.shape[-2:])
             shape = (*self.env.batch_size, *one)
-            given = _as_tensor("position", position, (one, shape), self.env.device)
-            start = given.expand(shape).reshape(start.shape)
+            given = as_array("position", position, (one, shape))
+            start = torch.tensor(given, device=self.env.device).expand(shape).reshape(start.shape)
         if mask is None:
             entries = TensorDict(position=start, batch_size=self.env.batch_size)
         else:
@@ -102,7 +102,8 @@ class Flights:
         """Fly a slot by ``action`` (*B, 2 H): reward, secrecy sum-rate and truncation, (*B,)."""
         state = self.state.copy()
         shape = self.env.action_spec.shape
-        state["action"] = _as_tensor("action", action, (shape,), self.env.device)
+        given = as_array("action", action, (shape,))
+        state["action"] = torch.tensor(given, device=self.env.device)
         flown = self.env.step(state)
         after = flown["next"]
         sum_rate = sum_rate_of(after, self.scenario.off_map_penalty)
@@ -224,9 +225,13 @@ def with_masks(entries: Mapping[str, Any], rows: Flags) -> dict[str, Any]:
     return own | {f"_{name}": rows.copy() for name in own}
 
 
-def _as_tensor(
-    name: str, value: ArrayLike, shapes: Sequence[tuple[int, ...]], device: torch.device
-) -> torch.Tensor:
+def as_array(name: str, value: ArrayLike, shapes: Sequence[tuple[int, ...]]) -> Floats:
+    """Finite numbers of one of the shapes.
+
+    Raises:
+        InputError: they have another shape, or are not finite.
+        InputTypeError: something else.
+    """
     accepted = f"finite numbers of shape {' or '.join(map(str, dict.fromkeys(shapes)))}"
     try:
         array = np.asarray(value, dtype=np.float32)
@@ -234,7 +239,7 @@ def _as_tensor(
         raise InputTypeError(rejection(name, value, accepted)) from None
     if array.shape not in shapes or not np.isfinite(array).all():
         raise InputError(rejection(name, value, accepted))
-    return torch.tensor(array, device=device)
+    return array
 
 
 def _arrays(entry: torch.Tensor | TensorDictBase) -> Any:
