@@ -162,6 +162,7 @@ def test_the_extras_are_there() -> None:
         "docs",
         "dev",
         "export",
+        "multiagent",
         "sb3",
         "tensorboard",
         "video",

@@ -21,6 +21,7 @@ from hyuav.learning.guide.robust import RobustDDPG as RobustDDPG
 from hyuav.learning.guide.robust import RobustSAC as RobustSAC
 from hyuav.learning.guide.robust import RobustTD3 as RobustTD3
 from hyuav.learning.learners import Learner as Learner
+from hyuav.learning.maddpg import MADDPG as MADDPG
 from hyuav.learning.policy import Policy as Policy
 from hyuav.learning.registry import register as register
 from hyuav.learning.sac import SAC as SAC

@@ -95,6 +95,25 @@ def test_a_scheme_and_a_seed_for_each_row_a_full_edge_and_a_disc_compile_too() -
 
 
 @COMPILES
+@pytest.mark.slow
+def test_agents_fly_in_compiled_slots_too() -> None:
+    scenario = dataclasses.replace(TWO_CLUSTERS, helper_starts=((-60.0, -60.0), (60.0, -60.0)))
+    envs = [
+        make_env(scenario, batch_size=8, seed=0, agents=True, compiled=fast)
+        for fast in (False, True)
+    ]
+    states = [env.reset() for env in envs]
+    for slot in range(3):
+        for state in states:
+            state["helpers", "action"] = torch.full((8, 2, 2), 0.3 * slot)
+        flown = [env.step(state)["next"] for env, state in zip(envs, states, strict=True)]
+        assert flown[1]["helpers"].batch_size == (8, 2)
+        assert_equal_up_to_rounding(*flown)
+        states = [after.exclude(("helpers", "reward")) for after in flown]
+    assert_equal_up_to_rounding(envs[0].reset(), envs[1].reset())
+
+
+@COMPILES
 def test_slots_without_fading_compile_too() -> None:
     calm = dataclasses.replace(TWO_CLUSTERS, fading=False)
     assert_equal_up_to_rounding(*both_flights(calm, scheme="relay", batch_size=64, seed=0))

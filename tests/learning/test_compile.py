@@ -21,6 +21,7 @@ from hyuav.physics.modes import MODE_RULES
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 FADELESS = dataclasses.replace(SCENARIO, fading=False, edge_energy_budget=8.0, speed_limit="disc")
+TWO_HELPERS = dataclasses.replace(SCENARIO, helper_starts=((-60.0, -60.0), (60.0, -60.0)))
 LEARNERS = [Learner("hybrid", 1), Learner("relay", 2), Learner("jamming", 3)]
 CASES = [
     ("ddpg", SCENARIO, "sum_rate"),
@@ -34,6 +35,7 @@ CASES = [
     pytest.param("sac", SCENARIO, "sum_rate", marks=pytest.mark.slow),
     pytest.param("sac_robust", SCENARIO, "sum_rate", marks=pytest.mark.slow),
     pytest.param("sac", FADELESS, "sum_rate", marks=pytest.mark.slow),
+    pytest.param("maddpg", TWO_HELPERS, "sum_rate", marks=pytest.mark.slow),
 ]
 
 

@@ -66,7 +66,7 @@ MANY = dataclasses.replace(
 )
 
 
-@pytest.mark.parametrize("name", ["ddpg", "td3", "sac"])
+@pytest.mark.parametrize("name", ["ddpg", "td3", "sac", "maddpg"])
 def test_a_policy_steers_several_helpers_and_their_power(name: str, tmp_path: Path) -> None:
     policy = untrained(name, scenario=MANY)
     flown = policy.make_env(batch_size=(3,), seed=0).rollout(4, policy)

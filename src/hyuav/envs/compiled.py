@@ -9,6 +9,7 @@ from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 from torch.fx import Graph, Node
 from torch.fx.experimental.proxy_tensor import make_fx
+from torchrl.data import Composite
 from torchrl.envs import TransformedEnv
 
 from hyuav._support.recording import COMPILATION_ERRORS, compile_graph, has_compiler
@@ -50,10 +51,10 @@ class CompiledEnv(TransformedEnv):
         before = self.full_state_spec.zero()
         before["position"] = self.base_env.start(tensordict)
         before.update(self.base_env.drawn_layouts())
-        before["action"] = self.full_action_spec["action"].zero()
-        before["episode_reward"] = self.full_reward_spec["reward"].zero()
+        before[self.action_key] = self.full_action_spec[self.action_key].zero()
+        before["episode_reward"] = self.observation_spec["episode_reward"].zero()
         before["step_count"] = torch.full_like(before["episode_reward"], -1, dtype=torch.int64)
-        after = self._flown(self._flight, before).exclude("reward")
+        after = self._flown(self._flight, before).exclude(self.reward_key)
         after["episode_reward"] = before["episode_reward"]
         if self.base_env.diagnostics:
             after["diagnostics"] = self.base_env.observation_spec["diagnostics"].zero()
@@ -83,14 +84,14 @@ class CompiledEnv(TransformedEnv):
 
     @property
     def _input_keys(self) -> list[Any]:
-        keys: list[Any] = ["position", "action", "episode_reward", "step_count", *self._own_state]
+        keys = ["position", self.action_key, "episode_reward", "step_count", *self._own_state]
         keys += self.base_env.node_entries(self.base_env.physics.nodes)
         return [*keys, ("diagnostics", "edge_load")] if self.base_env.diagnostics else keys
 
     def _inputs(self, tensordict: TensorDictBase) -> list[Tensor]:
         """The entries (..., *batch_size) that a slot starts from, as the graph reads memory."""
-        action = self.full_action_spec["action"]
-        require_shape("action", tensordict["action"], action.shape)
+        shape = self.full_action_spec[self.action_key].shape
+        require_shape("action", tensordict[self.action_key], shape)
         return [
             self._batch_last(
                 tensordict[key].to(torch.int64 if key == "step_count" else torch.float32)
@@ -112,6 +113,9 @@ class CompiledEnv(TransformedEnv):
         entries = TensorDict({}, batch_size=self.batch_size, device=self.device)
         for key, value in zip(keys, values, strict=False):
             entries[key] = self._batch_first(value)
+        for name, spec in self.observation_spec.items():
+            if isinstance(spec, Composite) and name in entries:
+                entries[name].batch_size = spec.shape  # of agents, with an axis for them
         return entries
 
     def _compile(self, tensordict: TensorDictBase) -> None:

@@ -3,7 +3,8 @@
 import copy
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from inspect import signature
 from types import FrameType
 from typing import Any
 
@@ -13,7 +14,7 @@ import torch
 from gymnasium.envs import registration
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
-from gymnasium.spaces import Box, Space
+from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 from tensordict import TensorDict, TensorDictBase
 from torchrl.envs import TransformedEnv
@@ -22,6 +23,7 @@ from hyuav._support.errors import InputError, InputTypeError, rejection, require
 from hyuav._support.parameters import Count, checked, plain
 from hyuav.envs.recorder import FlightRecorder
 from hyuav.envs.rewards import sum_rate_of
+from hyuav.envs.transforms import make_env
 from hyuav.physics.generators import LayoutGenerator, over_horizon
 from hyuav.physics.scenario import Scenario, as_scenario, is_layout
 
@@ -61,7 +63,7 @@ class Flights:
             raise ResetNeeded("call reset() before step() and render()")
         return self._state
 
-    def spaces(self) -> tuple[Space[Any], Space[Any]]:
+    def spaces(self) -> tuple[Box[np.float32], Box[np.float32]]:
         """One helper's observation and action space.
 
         A distance is at most the map's diagonal, sqrt(8) of the half sides it is measured in.
@@ -85,8 +87,8 @@ class Flights:
         if position is not None:
             one = (2,) if self.scenario.num_helpers == 1 else tuple(start.shape[-2:])
             shape = (*self.env.batch_size, *one)
-            given = _as_tensor("position", position, (one, shape), self.env.device)
-            start = given.expand(shape).reshape(start.shape)
+            given = as_array("position", position, (one, shape))
+            start = torch.tensor(given, device=self.env.device).expand(shape).reshape(start.shape)
         if mask is None:
             entries = TensorDict(position=start, batch_size=self.env.batch_size)
         else:
@@ -100,7 +102,8 @@ class Flights:
         """Fly a slot by ``action`` (*B, 2 H): reward, secrecy sum-rate and truncation, (*B,)."""
         state = self.state.copy()
         shape = self.env.action_spec.shape
-        state["action"] = _as_tensor("action", action, (shape,), self.env.device)
+        given = as_array("action", action, (shape,))
+        state["action"] = torch.tensor(given, device=self.env.device)
         flown = self.env.step(state)
         after = flown["next"]
         sum_rate = sum_rate_of(after, self.scenario.off_map_penalty)
@@ -201,6 +204,18 @@ def accepted_options(options: object, names: Sequence[str]) -> Mapping[str, Any]
     return options
 
 
+def require_options(options: Iterable[str]) -> None:
+    """Accept what :func:`hyuav.make_env` takes and the environments here do not set themselves.
+
+    Raises:
+        InputError: naming another.
+    """
+    own = ("scenario", "scheme", "batch_size", "device", "seed", "agents")
+    known = [name for name in signature(make_env).parameters if name not in own]
+    for name in options:
+        require_choice("option", name, known)
+
+
 def with_masks(entries: Mapping[str, Any], rows: Flags) -> dict[str, Any]:
     """Add to each entry the rows that it holds for, as Gymnasium's vector infos have it."""
     own = {
@@ -210,9 +225,13 @@ def with_masks(entries: Mapping[str, Any], rows: Flags) -> dict[str, Any]:
     return own | {f"_{name}": rows.copy() for name in own}
 
 
-def _as_tensor(
-    name: str, value: ArrayLike, shapes: Sequence[tuple[int, ...]], device: torch.device
-) -> torch.Tensor:
+def as_array(name: str, value: ArrayLike, shapes: Sequence[tuple[int, ...]]) -> Floats:
+    """Finite numbers of one of the shapes.
+
+    Raises:
+        InputError: they have another shape, or are not finite.
+        InputTypeError: something else.
+    """
     accepted = f"finite numbers of shape {' or '.join(map(str, dict.fromkeys(shapes)))}"
     try:
         array = np.asarray(value, dtype=np.float32)
@@ -220,7 +239,7 @@ def _as_tensor(
         raise InputTypeError(rejection(name, value, accepted)) from None
     if array.shape not in shapes or not np.isfinite(array).all():
         raise InputError(rejection(name, value, accepted))
-    return torch.tensor(array, device=device)
+    return array
 
 
 def _arrays(entry: torch.Tensor | TensorDictBase) -> Any:

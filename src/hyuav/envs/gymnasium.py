@@ -1,7 +1,6 @@
 """The environment through Gymnasium: one helper, or a native batch of them."""
 
-from collections.abc import Iterable, Sequence
-from inspect import signature
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -12,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from hyuav._support.errors import InputError, brief, rejection, require_choice
+from hyuav._support.errors import InputError, brief, rejection
 from hyuav._support.parameters import Count, checked
 from hyuav.envs.arguments import as_seed
 from hyuav.envs.flights import (
@@ -24,6 +23,7 @@ from hyuav.envs.flights import (
     accepted_options,
     limit_of_make,
     limited,
+    require_options,
     with_masks,
 )
 from hyuav.envs.transforms import make_env
@@ -98,7 +98,7 @@ class SecureOffloadingGymEnv(Limited, gymnasium.Env[Floats, Floats]):
         **options: Any,
     ) -> None:
         limit = limit_of_make(self) if max_episode_steps is None else max_episode_steps
-        _require_options(options)
+        require_options(options)
         seed = int(self.np_random.integers(2**63))
         env = make_env(limited(scenario, limit), scheme, (), device, seed, **options)
         self._flights = Flights(env, render_mode)
@@ -193,7 +193,7 @@ class SecureOffloadingVectorEnv(Limited, VectorEnv[Floats, Floats, NDArray[Any]]
         num_envs = checked(Count, "num_envs", num_envs)
         self._autoreset_mode = _as_mode(autoreset_mode)
         self.metadata = RENDERING | {"autoreset_mode": self._autoreset_mode}
-        _require_options(options)
+        require_options(options)
         seed = int(self.np_random.integers(2**63))
         scenario = limited(scenario, max_episode_steps)
         env = make_env(scenario, scheme, num_envs, device, seed, **options)
@@ -283,18 +283,6 @@ class SecureOffloadingVectorEnv(Limited, VectorEnv[Floats, Floats, NDArray[Any]]
             other if seed is None or not starts else seed
             for seed, other, starts in zip(given, others, started, strict=True)
         ]
-
-
-def _require_options(options: Iterable[str]) -> None:
-    """Accept what :func:`hyuav.make_env` takes and the environments here do not set themselves.
-
-    Raises:
-        InputError: naming another.
-    """
-    own = ("scenario", "scheme", "batch_size", "device", "seed")
-    known = [name for name in signature(make_env).parameters if name not in own]
-    for name in options:
-        require_choice("option", name, known)
 
 
 def _as_mode(mode: AutoresetMode | str) -> AutoresetMode:

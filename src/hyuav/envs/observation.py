@@ -24,14 +24,38 @@ class ObservationLayout:
     """
 
     def __init__(self, scenario: Scenario, *, clock: bool) -> None:
+        self._clock = int(clock)
         self.num_helpers = scenario.num_helpers
         """H."""
-        self.action_size = self.num_helpers * scenario.action_size
+        self.size_of_each_action = scenario.action_size
+        """Numbers by which an action steers one helper."""
+        self.action_size = self.num_helpers * self.size_of_each_action
         """Numbers of an action."""
         self.num_distances = scenario.num_ues + 1 + scenario.num_eavesdroppers
         """Of one helper."""
         self.size = self.num_helpers * (3 + self.num_distances) + clock
         """Numbers of an observation."""
+        self.size_of_each = 3 * self.num_helpers + self.num_distances + clock
+        """Numbers of what each helper observes as an agent."""
+
+    def of_each(self, values: Tensor) -> Tensor:
+        """What each helper observes as an agent: (..., H, size_of_each).
+
+        In this order: its own position (2), mode and distances to the UEs, L and the eavesdroppers
+        (U + 1 + E); then position and mode of each other helper, 3 (H - 1) numbers, from the one
+        after it on and with the first after the last; with a clock the slots flown.
+
+        Args:
+            values: (..., size), an observation of all helpers, or its bounds.
+        """
+        helpers = self.num_helpers
+        sizes = [2 * helpers, helpers, helpers * self.num_distances, self._clock]
+        position, mode, distances, flown = values.split(sizes, dim=-1)
+        place = torch.cat([position.unflatten(-1, (helpers, 2)), mode.unsqueeze(-1)], dim=-1)
+        others = [place.roll(-ahead, dims=-2) for ahead in range(1, helpers)]
+        flown = flown.unsqueeze(-2).expand(*place.shape[:-1], self._clock)
+        own = distances.unflatten(-1, (helpers, self.num_distances))
+        return torch.cat([place, own, *others, flown], dim=-1)
 
     def position(self, observation: Tensor) -> Tensor:
         """Where the helpers are: (..., 2 H), in units of half the map's side.

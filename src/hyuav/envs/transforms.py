@@ -9,6 +9,7 @@ from torchrl.envs import Compose, RewardSum, StepCounter, Transform, Transformed
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import checked
+from hyuav.envs.agents import GROUP, AgentsView, agent_names
 from hyuav.envs.arguments import as_scenarios
 from hyuav.envs.compiled import CompiledEnv
 from hyuav.envs.observation import JointView
@@ -91,6 +92,7 @@ def make_env(
     clock: bool = False,
     geofence: bool = False,
     compiled: bool = False,
+    agents: bool = False,
     reward: Reward | Source | str = SUM_RATE,
 ) -> TransformedEnv:
     """The environment as a learner sees it: :class:`SecureOffloadingEnv` with its transforms.
@@ -113,6 +115,9 @@ def make_env(
         geofence: slow flights so that they end on the map; see :class:`Geofence`.
         compiled: run each slot as one compiled graph, which takes half a minute in the first step
             and pays for batches of thousands that fly thousands of slots.
+        agents: offer each helper as an agent of the group ``helpers``, with its own observation
+            and action and the reward of all; see :class:`hyuav.envs.agents.AgentsView`.
+            ``env.group_map`` names them, ``helper_0`` and so on.
         reward: what a slot earns before the penalty: a :class:`hyuav.Reward`, or a function of the
             slot's outcome, a transform of TorchRL or a name, of which one is made. The penalty is
             then of the same unit.
@@ -122,6 +127,7 @@ def make_env(
     """
     checked(bool, "clock", clock)
     checked(bool, "geofence", geofence)
+    checked(bool, "agents", agents)
     objective = as_reward(reward)
     fixed = scenario.scenario if isinstance(scenario, LayoutGenerator) else scenario
     below, entries, changes = _parts(objective, as_scenarios(fixed, ())[0][0])
@@ -130,6 +136,8 @@ def make_env(
     )
     if changes:
         _require_numbers(objective, env.scenario, env.device)
+    if agents:
+        env.group_map = {GROUP: agent_names(env.scenario.num_helpers)}
     kind = CompiledEnv if checked(bool, "compiled", compiled) else TransformedEnv
     transformed = kind(
         env,
@@ -140,6 +148,7 @@ def make_env(
             RewardSum(),
             StepCounter(max_steps=env.scenario.num_slots),
             JointView(env.scenario, clock=clock),
+            *([AgentsView(env.scenario, clock=clock)] if agents else []),
         ),
         device=env.device,
     )

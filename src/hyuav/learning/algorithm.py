@@ -153,11 +153,14 @@ class AlgorithmParameters(Parameters, ABC):
 
         Reads ``observation`` (N, ..., observed), writes ``action`` (N, ..., 2) in [-1, 1].
         """
-        size, scale = self.observation_size(scenario), self.action_scale
-        output = ScaledTanh(scale) if scale > 1.0 else nn.Tanh()
-        actions = ObservationLayout(scenario, clock=self.clock).action_size
-        network = LearnerMLP(learners, size, self.hidden_sizes, actions, self.activation, output)
+        layout, output = ObservationLayout(scenario, clock=self.clock), self.make_actor_output()
+        sizes = layout.size, self.hidden_sizes, layout.action_size
+        network = LearnerMLP(learners, *sizes, self.activation, output)
         return TensorDictModule(network, in_keys=["observation"], out_keys=["action"])
+
+    def make_actor_output(self) -> nn.Module:
+        """What ends an actor: its numbers (...) become actions (...) in [-1, 1]."""
+        return ScaledTanh(self.action_scale) if self.action_scale > 1.0 else nn.Tanh()
 
     def make_critic(self, learners: int, scenario: Scenario) -> TensorDictModule:
         """Q(s, a) of N learners.

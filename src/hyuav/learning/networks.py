@@ -21,19 +21,24 @@ class LearnerLinear(nn.Module):
         learners: N, the length of the learner axis.
         in_features: of each learner's layer.
         out_features: of each learner's layer.
+        members: M, how many such layers each learner has, each for inputs of its own.
     """
 
-    def __init__(self, learners: int, in_features: int, out_features: int) -> None:
+    def __init__(
+        self, learners: int, in_features: int, out_features: int, members: int | None = None
+    ) -> None:
         super().__init__()
         bound = 1.0 / math.sqrt(in_features)
-        self.weight = nn.Parameter(torch.empty(learners, in_features, out_features))
-        self.bias = nn.Parameter(torch.empty(learners, 1, out_features))
+        rows = (learners,) if members is None else (members, learners)
+        self.weight = nn.Parameter(torch.empty(*rows, in_features, out_features))
+        self.bias = nn.Parameter(torch.empty(*rows, 1, out_features))
         for values in (self.weight, self.bias):
             nn.init.uniform_(values, -bound, bound)
 
     def forward(self, inputs: Tensor) -> Tensor:
-        """Map (N, K, in_features) to (N, K, out_features)."""
-        return torch.bmm(inputs, self.weight) + self.bias  # a graph adds it for nothing
+        """Map (N, K, in_features) to (N, K, out_features); of members (M N, K, ...), M first."""
+        weight, bias = self.weight.flatten(0, -3), self.bias.flatten(0, -3)
+        return torch.bmm(inputs, weight) + bias  # a graph adds it for nothing
 
 
 class LearnerMLP(nn.Module):
@@ -48,6 +53,7 @@ class LearnerMLP(nn.Module):
         output: applied to the last layer's result, if any.
         layer_norm: bring each hidden layer's sums to zero mean and unit variance (Ba et al.,
             2016), without weights of its own.
+        members: how many such perceptrons each learner has; see :class:`LearnerLinear`.
     """
 
     def __init__(
@@ -60,16 +66,17 @@ class LearnerMLP(nn.Module):
         output: nn.Module | None = None,
         *,
         layer_norm: bool = False,
+        members: int | None = None,
     ) -> None:
         super().__init__()
         sizes = [in_features, *hidden_sizes]
         layers: list[nn.Module] = []
         for before, after in itertools.pairwise(sizes):
-            layers.append(LearnerLinear(learners, before, after))
+            layers.append(LearnerLinear(learners, before, after, members))
             if layer_norm:
                 layers.append(nn.LayerNorm(after, elementwise_affine=False))
             layers.append(ACTIVATIONS[activation]())
-        layers.append(LearnerLinear(learners, sizes[-1], out_features))
+        layers.append(LearnerLinear(learners, sizes[-1], out_features, members))
         self.layers = nn.Sequential(*layers)
         self.output = nn.Identity() if output is None else output
 

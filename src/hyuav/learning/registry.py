@@ -9,6 +9,7 @@ from hyuav._support.registry import Registry
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.robust import RobustDDPG, RobustSAC, RobustTD3
+from hyuav.learning.maddpg import MADDPG
 from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
 
@@ -43,6 +44,7 @@ ALGORITHMS: Registry[type[AlgorithmParameters]] = Registry(
         "ddpg": DDPG,
         "td3": TD3,
         "sac": SAC,
+        "maddpg": MADDPG,
         "ddpg_robust": RobustDDPG,
         "td3_robust": RobustTD3,
         "sac_robust": RobustSAC,
