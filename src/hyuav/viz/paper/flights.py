@@ -111,19 +111,22 @@ def save_flight_map(
 
 def _draw_optimum(axes: Axes, flown: Mapping[str, Flight], optimum: str) -> None:
     if optimum in flown:
-        axes.plot(
-            *flown[optimum].path.T,
-            color=OPTIMUM_COLOR,
-            linewidth=OPTIMUM_WIDTH,
-            zorder=1.5,
-            label=LABELS["optimum"],
-        )
+        for number, path in enumerate(flown[optimum].path.swapaxes(0, 1)):
+            axes.plot(
+                *path.T,
+                color=OPTIMUM_COLOR,
+                linewidth=OPTIMUM_WIDTH,
+                zorder=1.5,
+                label=None if number else LABELS["optimum"],
+            )
 
 
 def _draw_scheme(axes: Axes, flown: Mapping[str, Flight], scheme: str) -> None:
     if scheme in flown:
-        flight = flown[scheme]
-        draw_flight(axes, flight.path, flight.relay, COLORS[scheme], LABELS[scheme])
+        flight, color = flown[scheme], COLORS[scheme]
+        for helper in range(flight.relay.shape[1]):
+            label = None if helper else LABELS[scheme]
+            draw_flight(axes, flight.path[:, helper], flight.relay[:, helper], color, label)
 
 
 def _coverage_handle() -> Patch:
