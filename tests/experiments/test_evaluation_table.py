@@ -65,7 +65,7 @@ def test_with_several_helpers_the_share_of_the_upper_bound_stands_beside_that_of
 def test_upper_bounds_are_told_below_the_table() -> None:
     result = {"upper_bound": 65.7}
     told = upper_bounds({"schemes": {"proposed": result, "optimum": result, "re_optimum": {}}})
-    assert told == "upper bounds on what any flight earns (bps/Hz): 65.70 (Optimum)"
+    assert told == "no flight exceeds 65.70 (Optimum) bps/Hz"
 
 
 def test_energy_budgets_that_are_exceeded_are_told() -> None:

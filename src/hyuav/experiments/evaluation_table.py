@@ -63,7 +63,7 @@ def upper_bounds(summary: Mapping[str, Any]) -> str:
         for name in OPTIMA.values()
         if "upper_bound" in schemes.get(name, {})
     ]
-    return f"upper bounds on what any flight earns (bps/Hz): {', '.join(told)}"
+    return f"no flight exceeds {', '.join(told)} bps/Hz"
 
 
 def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
