@@ -42,7 +42,7 @@ from hyuav.experiments.evaluation import (
 )
 from hyuav.experiments.evaluation_table import print_results
 from hyuav.experiments.own_code import OwnAlgorithm
-from hyuav.experiments.policies import learned_policies, reference_policies
+from hyuav.experiments.policies import learned_policies, references
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.tracking import EvaluationLoggerParameters, log_evaluation
 from hyuav.viz.html.page import write_report
@@ -103,14 +103,14 @@ def main(config: Config, _: Path) -> None:
     learned = learned_policies(runs, scenario, num_slots=flown.num_slots)
     tell_who_flies(runs, flown.num_slots, console)
     first = Path(options.run[0])
-    beside = first if runs[0].path == first else first / "evaluation"
-    output = Path(options.output or flown.directory(RunDirectory(beside)))
+    kept = first if runs[0].path == first else first / "evaluation"
+    output = Path(options.output or flown.directory(RunDirectory(kept)))
     require_writable("output", output / "figures")
     for name in (EVALUATION_FILE, FLIGHTS_FILE):
         if (output / name).is_dir():
             raise InputError(rejection(name, str(output / name), "a file or none, not a directory"))
-    references = reference_policies(scenario, parameters.resolution, console, reward)
-    policies = {**learned, **references}
+    beside = references(scenario, parameters.resolution, console, reward)
+    policies = {**learned, **beside.policies}
     with make_progress(console, "evaluating") as progress:
         evaluation = evaluate(
             scenario,
@@ -120,6 +120,7 @@ def main(config: Config, _: Path) -> None:
             options.device,
             track=progress.track,
             reward=reward,
+            upper_bounds=beside.upper_bounds,
         )
     evaluation.save(output)
     save_flight_map(scenario, evaluation.flights, output / "figures")

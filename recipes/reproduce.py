@@ -45,7 +45,7 @@ from hyuav.experiments.elsewhere import horizon_directory
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.experiments.evaluation_table import print_results
 from hyuav.experiments.initial_weights import select_initial_weights
-from hyuav.experiments.policies import Policies, learned_policies, reference_policies
+from hyuav.experiments.policies import Policies, learned_policies, references
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
 from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
@@ -73,7 +73,7 @@ class Reproduce(Parameters):
     num_slots: OneOrMore[Count] | None = parameter(None, symbol="T")
     """Horizons to train and evaluate besides the scenario's own, as for Fig. 4."""
     also: OneOrMore[Preset] | None = parameter(None)
-    """Presets whose UEs are flown over too, all else being as in the scenario, as for Fig. 3."""
+    """Presets that are flown too, with what was changed in the scenario, as for Fig. 3."""
     figures: OneOrMore[FigureName] | None = parameter(None)
     """To draw; None for all that these settings allow."""
     candidates: Annotated[int, Field(ge=1, le=1000)] = parameter(5)
@@ -184,20 +184,18 @@ class Work:
         """Fly a run's actors, what stands beside them and the references; keep what came of it."""
         trained = run.configuration()
         reward = trained.reward
-        policies = {
-            **learned_policies([run], scenario),
-            **(beside or {}),
-            **reference_policies(scenario, self.evaluation.resolution, self.console, reward),
-        }
+        learned = {**learned_policies([run], scenario), **(beside or {})}
+        best = references(scenario, self.evaluation.resolution, self.console, reward)
         with make_progress(self.console, "evaluating") as progress:
             evaluation = evaluate(
                 scenario,
                 trained.scenario_name,
-                policies,
+                {**learned, **best.policies},
                 self.evaluation,
                 self.device,
                 track=progress.track,
                 reward=reward,
+                upper_bounds=best.upper_bounds,
             )
         evaluation.save(directory)
         return evaluation
@@ -242,7 +240,7 @@ def _over_horizons(
 
 
 def _on_further_presets(own: RunConfiguration, options: Reproduce) -> list[RunConfiguration]:
-    """The same where the UEs are at a preset's places."""
+    """The same in other presets, changed as the scenario is."""
     presets = options.also or ()
     for index, name in enumerate(presets):
         if name in (own.scenario_name, *presets[:index]):
@@ -252,11 +250,19 @@ def _on_further_presets(own: RunConfiguration, options: Reproduce) -> list[RunCo
         dataclasses.replace(
             own,
             scenario_name=name,
-            scenario=dataclasses.replace(own.scenario, ue_positions=PRESETS[name]),
+            scenario=_changed_alike(PRESETS[name], own),
             learners=_learners(options, options.further_seeds),
         )
         for name in presets
     ]
+
+
+def _changed_alike(preset: Scenario, own: RunConfiguration) -> Scenario:
+    """A preset with what differs in the run's scenario, but for the UEs, from its own preset."""
+    flown = own.scenario
+    begun = PRESETS.get(own.scenario_name, Scenario(ue_positions=flown.ue_positions)).to_dict()
+    changes = {name: value for name, value in flown.to_dict().items() if value != begun[name]}
+    return dataclasses.replace(preset, **{**changes, "ue_positions": preset.ue_positions})
 
 
 def _candidates(

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
-from hyuav.experiments.policies import learned_policies, reference_policies
+from hyuav.experiments.policies import learned_policies, references
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import train
@@ -59,7 +59,8 @@ def evaluated(trained: RunDirectory, tmp_path_factory: pytest.TempPathFactory) -
     """The same, evaluated beside the references."""
     directory = tmp_path_factory.mktemp("evaluated") / "run"
     shutil.copytree(trained.path, directory)
-    policies = learned_policies([trained], SCENARIO) | reference_policies(SCENARIO, 10.0, SILENT)
+    beside = references(SCENARIO, 10.0, SILENT).policies
+    policies = learned_policies([trained], SCENARIO) | beside
     parameters = EvaluationParameters(episodes=4, flights=2)
     evaluate(SCENARIO, "two_clusters", policies, parameters).save(directory)
     return RunDirectory(directory)

@@ -53,13 +53,13 @@ def recipes_page() -> str:
 
 def configuration_page() -> str:
     """The scenario, the algorithms and the learners, field by field."""
-    names = ", ".join(f"`{name}`" for name in PRESETS)
     parts = [
         "# Configuration",
         "What every field means is told with its equation in [The model](../model.md).",
         "## `scenario`",
-        f"[`hyuav.Scenario`][hyuav.physics.scenario.Scenario]. Presets, which give `ue_positions`: "
-        f"{names}.",
+        "[`hyuav.Scenario`][hyuav.physics.scenario.Scenario]. Presets give `ue_positions`, and "
+        "where the paper has no such scenario, more:",
+        "\n".join(map(_preset, PRESETS)),
         table(Scenario),
     ]
     for layout, kind in LAYOUTS.items():
@@ -85,6 +85,14 @@ def configuration_page() -> str:
         table(Learner),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _preset(name: str) -> str:
+    """An item of a list: a preset and the fields that it gives besides the UEs."""
+    paper = Scenario(ue_positions=PRESETS[name].ue_positions).to_dict()
+    own = [(field, value) for field, value in PRESETS[name].to_dict().items()]
+    given = [f"`{field}={_shown(value)}`" for field, value in own if value != paper[field]]
+    return f"- `{name}`" + (f": {', '.join(given)}" if given else "")
 
 
 def table(parameters: type[Parameters], defaults: dict[str, Any] | None = None) -> str:

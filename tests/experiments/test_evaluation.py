@@ -20,7 +20,7 @@ from hyuav.experiments.evaluation import (
     fly,
     secrecy_sum_rate,
 )
-from hyuav.experiments.policies import Policies, reference_policies
+from hyuav.experiments.policies import Policies, references
 from hyuav.experiments.schemes import LABELS, OPTIMA
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.robust import RobustTD3
@@ -225,25 +225,57 @@ def test_an_unknown_scheme_or_none_is_refused() -> None:
             evaluate(SCENARIO, "two_clusters", policies, FEW)
 
 
-def test_several_helpers_have_columns_of_their_own() -> None:
+@pytest.mark.parametrize(
+    ("name", "places", "ways"),
+    [
+        ("two_eavesdroppers", ((-47.0, 48.0), (40.0, -23.0)), {1, 2}),
+        ("contested", ((-60.0, -50.0), (60.0, 55.0)), {0}),
+    ],
+)
+def test_several_helpers_have_columns_of_their_own(
+    name: str, places: tuple[tuple[float, float], ...], ways: set[int]
+) -> None:
     two = dataclasses.replace(
-        SCENARIO,
-        helper_starts=((-60.0, -60.0), (60.0, -60.0)),
-        eavesdropper_positions=((80.0, 80.0), (-80.0, 60.0)),
+        Scenario.preset(name), helper_starts=places, num_slots=3, fading=False
     )
-    path = torch.tensor(two.helper_starts).expand(two.num_slots + 1, 2, 2)
-    found = evaluate(two, "two", {"optimum": FlightPolicy(path, two)}, FEW)
-    assert {f"{name}_{helper}" for name in ("x", "y", "relay") for helper in (1, 2)} < set(
-        found.flights.columns
-    )
-    assert (found.flights["x_2"] == 60.0).all()
-    assert found.summary["schemes"]["optimum"]["secrecy_sum_rate"]["mean"] >= 0.0
+    path = torch.tensor(places).expand(4, 2, 2)
+    flights = evaluate(two, name, {"optimum": FlightPolicy(path, two)}, FEW).flights
+    names = {f"{name}_{helper}" for name in ("x", "y", "relay", "off_map") for helper in (1, 2)}
+    assert names | {"helper_energy_1", "helper_energy_2", "way"} < set(flights.columns)
+    assert {"x", "relay", "helper_energy"}.isdisjoint(flights.columns)
+    assert (flights["x_2"] == places[1][0]).all()
+    assert (flights["relay_1"] == (ways != {0})).all()
+    for way, offloads in zip(flights["way"], flights["offloading"], strict=True):
+        assert {own for own, sends in zip(way, offloads, strict=True) if sends} <= ways
+        assert any(offloads)
+
+
+def test_what_helpers_do_together_is_made_of_what_each_does() -> None:
+    two = dataclasses.replace(Scenario.preset("two_eavesdroppers"), num_slots=4)
+    path = torch.tensor(two.helper_starts).expand(5, 2, 2).clone()
+    path[:, 0, 0] -= 20.0 * torch.arange(5)  # the edge turns it back twice
+    flown = evaluate(two, "two", {"ja_lt": FlightPolicy(path, two)}, FEW).summary["schemes"]
+    found = flown["ja_lt"]
+    for name, whole in (("relay_share", 0.5), ("off_map", 1.0), ("helper_energy", 1.0)):
+        assert found[name] == pytest.approx(whole * (found[f"{name}_1"] + found[f"{name}_2"]))
+    assert (found["off_map_1"], found["off_map_2"]) == (2.0, 0.0)
+    assert found["helper_energy_1"] > found["helper_energy_2"] > 0.0
+
+
+def test_the_fractions_of_upper_bounds_are_of_each_mode_rules_own() -> None:
+    policies = {"re_lt": re_lt(SCENARIO), "ja_lt": ja_lt(SCENARIO)}
+    bounds = {"re_optimum": 100.0, "optimum": 300.0}
+    found = evaluate(SCENARIO, "x", policies, FEW, upper_bounds=bounds).summary["schemes"]
+    mean = found["re_lt"]["secrecy_sum_rate"]["mean"]
+    assert found["re_lt"]["upper_bound"] == 100.0
+    assert found["re_lt"]["fraction_of_upper_bound"] == pytest.approx(mean / 100.0)
+    assert "fraction_of_upper_bound" not in found["ja_lt"]
 
 
 def test_the_optimum_flies_with_the_power_that_was_chosen() -> None:
     scenario = dataclasses.replace(SCENARIO, power_control=True, power_range=30.0, fading=False)
-    references = reference_policies(scenario, 10.0, Console(quiet=True))
-    found = evaluate(scenario, "power", references, FEW).summary["schemes"]
+    policies = references(scenario, 10.0, Console(quiet=True)).policies
+    found = evaluate(scenario, "power", policies, FEW).summary["schemes"]
     best = solve_optimum(scenario, resolution=10.0)
     for scheme, rule in (("optimum", "hybrid"), ("ja_optimum", "jamming")):
         mean = found[scheme]["secrecy_sum_rate"]["mean"]

@@ -5,7 +5,7 @@ import pandas as pd
 from rich.console import Console
 
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.experiments.evaluation_table import print_results
+from hyuav.experiments.evaluation_table import print_results, upper_bounds
 
 
 def printed(name: str = "square", reward: dict[str, str] | None = None, **more: Any) -> list[str]:
@@ -47,6 +47,25 @@ def test_another_reward_stands_before_the_sum_rate_within_80_columns() -> None:
     ]
     assert {"(bit/Hz/J)", "(bps/Hz)"} <= {word for line in lines for word in line.split()}
     assert max(map(len, lines)) <= 80
+
+
+def test_with_several_helpers_the_share_of_the_upper_bound_stands_beside_that_of_the_lower() -> (
+    None
+):
+    lines = printed(fraction_of_optimum=0.981, upper_bound=65.7, fraction_of_upper_bound=0.911)
+    row = next(line for line in lines if line.lstrip().startswith("Proposed"))
+    assert row.split()[4:8] == ["98.1", "%", "91.1", "%"]
+    assert any(
+        line.split() == ["Scheme", "(bps/Hz)", *["bound"] * 2, "slots", "loading", "map"]
+        for line in lines
+    )
+    assert max(map(len, lines)) <= 80
+
+
+def test_upper_bounds_are_told_below_the_table() -> None:
+    result = {"upper_bound": 65.7}
+    told = upper_bounds({"schemes": {"proposed": result, "optimum": result, "re_optimum": {}}})
+    assert told == "no flight exceeds 65.70 (Optimum) bps/Hz"
 
 
 def test_energy_budgets_that_are_exceeded_are_told() -> None:

@@ -7,7 +7,7 @@ from torch import nn
 
 from hyuav import InputError, Policy
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
-from hyuav.experiments.policies import learned_policies, reference_policies, require_fit
+from hyuav.experiments.policies import learned_policies, references, require_fit
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.train import train
 from sample_runs import ONE_OF_EACH, SILENT, UNLOGGED
@@ -60,6 +60,6 @@ def test_an_actor_earns_in_the_evaluation_what_it_earned_in_training(tmp_path: P
 
 
 def test_the_references_of_a_scenario_are_two_straight_flights_and_three_optima() -> None:
-    assert set(reference_policies(ONE_OF_EACH.scenario, 5.0, SILENT)) == {
+    assert set(references(ONE_OF_EACH.scenario, 5.0, SILENT).policies) == {
         *("re_lt", "ja_lt", "optimum", "re_optimum", "ja_optimum")
     }

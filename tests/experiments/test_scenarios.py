@@ -49,8 +49,21 @@ def test_a_comparison_takes_presets_layouts_and_fields() -> None:
     assert compared["loud"] == Scenario(ue_positions=disk(10, seed=2), jamming_power=0.3)
 
 
-@pytest.mark.parametrize("field", ["helper_starts", "eavesdropper_positions"])
-def test_several_helpers_or_eavesdroppers_are_for_python(field: str) -> None:
-    values = {**offered("two_clusters"), field: [[0.0, 0.0], [10.0, 10.0]]}
-    with pytest.raises(InputError, match=rf"^scenario\.{field} = .* in Python so far$"):
-        named_scenario(values)
+def test_a_preset_keeps_all_that_is_not_changed() -> None:
+    name, scenario = named_scenario({"name": "contested", "num_slots": 5})
+    assert name == "contested"
+    assert scenario == dataclasses.replace(Scenario.preset("contested"), num_slots=5)
+
+
+def test_several_helpers_and_eavesdroppers_are_read_back_as_they_were(tmp_path: Path) -> None:
+    values = {
+        **offered("two_clusters"),
+        "helper_starts": [[0.0, 0.0], [10.0, 10.0], [20.0, 0.0]],
+        "eavesdropper_positions": [[80.0, 80.0], [-80.0, 80.0]],
+        "eavesdroppers": "colluding",
+    }
+    name, scenario = named_scenario({"name": "crowded", **values})
+    assert (scenario.num_helpers, scenario.num_eavesdroppers) == (3, 2)
+    scenario.save(tmp_path / "crowded.yaml")
+    assert Scenario.load(tmp_path / "crowded.yaml") == scenario
+    assert named_scenario({"name": name, **scenario.to_dict()}) == (name, scenario)

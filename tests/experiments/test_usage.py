@@ -47,8 +47,10 @@ def test_defaults_groups_and_sections_are_told(
     assert {"num_slots=[10,20]", "without=[]", "output=runs/TIME_compare"} <= set(told.split())
     monkeypatch.setattr(start, "called", ["hyuav", "train"])
     call("train", "-h")
-    lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
-    assert "scenario=two_clusters or clusters, disk, random_disk, random_layout" in lines
+    told = capsys.readouterr().out
+    members = "clusters, contested, disk, random_disk, random_layout, two_eavesdroppers"
+    assert f"scenario=two_clusters or {members}" in " ".join(told.split())
+    lines = [" ".join(line.split()) for line in told.splitlines()]
     assert "logger=wandb or none, tensorboard" in lines
     assert "logger library, mode, project, entity, group, job_type, name, tags, id" in lines
 

@@ -103,17 +103,45 @@ def test_the_defaults_are_those_of_the_papers_parameter_table() -> None:
 
 
 def test_the_presets_place_ten_ues() -> None:
-    assert PRESETS["random_disk"] == (
+    assert PRESETS["random_disk"].ue_positions == (
         *((23, 13), (2, 30), (9, -26), (-28, -16), (30, 20)),
         *((-37, 17), (-22, 3), (18, 29), (-3, -35), (17, 15)),
     )
-    assert PRESETS["two_clusters"] == (
+    assert PRESETS["two_clusters"].ue_positions == (
         *((-10, 18), (-20, 18), (-26, 29), (-25, 26), (-19, 15), (-32, 12), (-35, 20)),
         *((26, -16), (18, -30), (23, -20)),
     )
     for name in PRESETS:
-        assert Scenario.preset(name).ue_positions == PRESETS[name]
+        assert Scenario.preset(name) == PRESETS[name]
         assert Scenario.preset(name).num_ues == 10
+
+
+def test_the_papers_presets_differ_in_their_ues_alone() -> None:
+    ues = Scenario.preset("random_disk").ue_positions
+    assert dataclasses.replace(TWO_CLUSTERS, ue_positions=ues) == Scenario.preset("random_disk")
+
+
+def test_two_eavesdroppers_are_over_the_two_clusters() -> None:
+    assert Scenario.preset("two_eavesdroppers") == dataclasses.replace(
+        TWO_CLUSTERS,
+        eavesdropper_positions=((80, 80), (-80, 60)),
+        helper_starts=((-60, -60), (60, -60)),
+    )
+
+
+def test_the_contested_preset_is_the_papers_but_for_its_nodes_coverage_and_jamming() -> None:
+    assert Scenario.preset("contested") == Scenario(
+        ue_positions=(
+            *((-80, -40), (-70, -55), (-60, -70), (-85, -60), (-65, -45)),
+            *((70, 60), (60, 75), (80, 50), (75, 70), (55, 60)),
+        ),
+        legitimate_position=(0, 0),
+        eavesdropper_positions=((-60, -50), (60, 55)),
+        eavesdropper_altitude=100.0,
+        helper_starts=((0, 0), (0, 0)),
+        coverage_radius=120.0,
+        jamming_power=1e-4,
+    )
 
 
 def test_an_unknown_preset_is_answered_with_the_closest() -> None:

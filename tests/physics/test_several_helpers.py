@@ -18,18 +18,8 @@ from hyuav.physics.tasks import draw_tasks, mean_tasks
 
 TINY = 1e-9
 TWO_CLUSTERS = dataclasses.replace(Scenario.preset("two_clusters"), fading=False)
-CONTESTED = dataclasses.replace(
-    TWO_CLUSTERS,
-    ue_positions=(
-        *((-80, -40), (-70, -55), (-60, -70), (-85, -60), (-65, -45)),
-        *((70, 60), (60, 75), (80, 50), (75, 70), (55, 60)),
-    ),
-    eavesdropper_positions=((-60, -50), (60, 55)),
-    eavesdropper_altitude=100.0,
-    coverage_radius=120.0,
-    jamming_power=1e-4,
-)
-TWO = ((80, 80), (-80, 60))
+CONTESTED = dataclasses.replace(Scenario.preset("contested"), fading=False)
+TWO_EAVESDROPPERS = dataclasses.replace(Scenario.preset("two_eavesdroppers"), fading=False)
 
 
 def hovering(scenario: Scenario, *helpers: tuple[float, float], **control: Any) -> SlotOutcome:
@@ -77,7 +67,7 @@ def test_the_sum_rates_of_two_clusters_by_the_modes_of_its_helpers(
 def test_the_sum_rates_of_two_clusters_with_two_eavesdroppers(
     helpers: tuple[tuple[float, float], ...], kind: str, expected: dict[int, tuple[float, int]]
 ) -> None:
-    scenario = dataclasses.replace(TWO_CLUSTERS, eavesdropper_positions=TWO, eavesdroppers=kind)
+    scenario = dataclasses.replace(TWO_EAVESDROPPERS, eavesdroppers=kind)
     none = (0.0, 0)
     found = sums(hovering(scenario, *helpers))
     assert found == [expected.get(number, none) for number in range(4)]

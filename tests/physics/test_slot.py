@@ -15,7 +15,6 @@ from hyuav.physics.energy import budget_speeds
 from hyuav.physics.layout import Nodes
 from hyuav.physics.modes import MODE_RULES, ModeRule
 from hyuav.physics.outcome import Control
-from hyuav.physics.scenario import PRESETS
 from hyuav.physics.slot import Geometry, Physics, slot
 from hyuav.physics.tasks import Tasks, draw_tasks, mean_tasks
 from reference import hover, with_helper
@@ -345,7 +344,7 @@ def test_degenerate_worlds_have_finite_rates(
         assert bool((rate >= 0).all()), case
 
 
-@pytest.mark.parametrize("layout", sorted(PRESETS))
+@pytest.mark.parametrize("layout", ["random_disk", "two_clusters"])
 def test_sum_rates_are_differentiable_in_the_position(layout: str) -> None:
     physics = double(without_fading(layout))
     # Away from the points where a UE starts or stops to offload.

@@ -1,5 +1,6 @@
 """The main job: over several layouts and horizons, and at its full length."""
 
+import dataclasses
 import json
 import re
 from pathlib import Path
@@ -42,8 +43,7 @@ def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
     assert proposed["learners"].to_dict() == {8: 2, 10: 1}
     beside = RunDirectory(job / "random_disk")
     configuration = beside.configuration()
-    assert configuration.scenario.ue_positions == PRESETS["random_disk"]
-    assert configuration.scenario.num_slots == 8
+    assert configuration.scenario == dataclasses.replace(PRESETS["random_disk"], num_slots=8)
     assert len(configuration.learners) == 3
     assert (beside.figures / "trajectories.pdf").exists()
     paper = RunDirectory(job / "as_in_paper").metrics()

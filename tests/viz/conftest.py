@@ -9,7 +9,7 @@ from rich.console import Console
 
 from dashboard_runs import SCENARIO, WriteRun, configuration, write_run
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
-from hyuav.experiments.policies import learned_policies, reference_policies
+from hyuav.experiments.policies import learned_policies, references
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import train
 
@@ -22,7 +22,7 @@ def trained_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = train(root / "tiny", asked, LoggerParameters(mode="disabled"), quiet)
     policies = {
         **learned_policies([run], SCENARIO),
-        **reference_policies(SCENARIO, 5.0, quiet),
+        **references(SCENARIO, 5.0, quiet).policies,
     }
     parameters = EvaluationParameters(episodes=4, flights=2)
     evaluate(SCENARIO, "two_clusters", policies, parameters).save(run.path)

@@ -23,6 +23,8 @@ def diagnostics_spec(batch_size: torch.Size, scenario: Scenario, device: torch.d
     - ``edge_energy`` (1,) J: of computing what was taken in the previous slot.
     - ``helper_energy`` (H,) J: of flying and transmitting.
     - ``budget_violation`` (1,) int64: how many nodes spend more than E_u, E_L or E_H.
+    - ``way`` (U,) int64, with several helpers only: how a UE sends if it offloads, 0 straight to L
+      and i through helper i. Of one helper the mode tells it.
     """
     num_ues = scenario.num_ues
     per_ue, per_slot = (*batch_size, num_ues), (*batch_size, 1)
@@ -31,6 +33,7 @@ def diagnostics_spec(batch_size: torch.Size, scenario: Scenario, device: torch.d
     def numbers(shape: tuple[int, ...], dtype: torch.dtype = torch.float32) -> Unbounded:
         return Unbounded(shape, dtype=dtype, device=device)
 
+    several = {"way": numbers(per_ue, torch.int64)} if scenario.num_helpers > 1 else {}
     return Composite(
         offloading=Binary(num_ues, per_ue, dtype=torch.bool, device=device),
         secrecy_rate=numbers(per_ue),
@@ -38,6 +41,7 @@ def diagnostics_spec(batch_size: torch.Size, scenario: Scenario, device: torch.d
         helper_energy=numbers((*batch_size, scenario.num_helpers)),
         budget_violation=numbers(per_slot, torch.int64),
         **{name: numbers(per_slot) for name in scalars},
+        **several,
         shape=batch_size,
         device=device,
     )
@@ -65,6 +69,7 @@ def diagnose(
         + (edge_energy > _rounded_up(scenario.edge_energy_budget))
         + (helper_energy > _rounded_up(scenario.helper_energy_budget)).sum(dim=-1, keepdim=True)
     )
+    several = {"way": slot.way} if scenario.num_helpers > 1 else {}
     return TensorDict(
         offloading=offloading,
         secrecy_rate=slot.offloading_rate,
@@ -75,6 +80,7 @@ def diagnose(
         edge_energy=edge_energy,
         helper_energy=helper_energy,
         budget_violation=violations,
+        **several,
         batch_size=slot.relays.shape[:-1],
         device=edge_load.device,
     )

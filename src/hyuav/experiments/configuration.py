@@ -34,6 +34,7 @@ from hyuav.experiments.scenarios import NAMES, offered
 from hyuav.experiments.tracking import LoggerParameters, loggers
 from hyuav.experiments.usage import usage
 from hyuav.learning.registry import ALGORITHMS
+from hyuav.physics.scenario import PRESETS
 
 NOW = "${now:%Y-%m-%d_%H-%M-%S}"
 """In the pattern of a run's directory, when the command was called."""
@@ -230,7 +231,8 @@ def _completed(group: str, member: str, values: Config) -> Config:
     elif group == LOGGER:
         defaults = LoggerParameters.defaults()
     else:
-        defaults = offered(str(values.get("layout", NAMES[0])))
+        preset = values.get("name", member)
+        defaults = offered(values.get("layout", preset if preset in PRESETS else NAMES[0]))
         defaults.pop("ue_positions", None)
     completed = {**defaults, **values}
     for name, own in defaults.items():

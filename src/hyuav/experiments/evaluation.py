@@ -39,6 +39,10 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 EVALUATION_FILE, FLIGHTS_FILE = "evaluation.json", "flights.parquet"
 
+PER_UE, WAY = ("offloading", "secrecy_rate", "ue_energy"), "way"
+"""Columns of the flights with a list for the UEs; the last one only with several helpers: 0 where a
+UE that offloads sends straight to L, i where it sends through helper i."""
+
 RETURNS = ("secrecy_sum_rate", "reward")
 """What is told of each scheme with an interval; the latter only where it is not the former."""
 
@@ -84,6 +88,7 @@ def evaluate(
     *,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
     reward: Reward | Source | str = SUM_RATE,
+    upper_bounds: Mapping[str, float] | None = None,
 ) -> Evaluation:
     """Fly every scheme through the same draws of fading and tasks.
 
@@ -98,6 +103,8 @@ def evaluate(
         track: passes on the schemes one by one, as what shows the progress does.
         reward: by which fractions of the optimum are told, and what is earned beside the secrecy
             sum-rate; as for :func:`hyuav.make_env`.
+        upper_bounds: by scheme of an optimum, what no flight under its mode rule earns, as
+            :attr:`hyuav.Optimum.upper_bound`; fractions of them are given too.
 
     Raises:
         InputError: no scheme, an unknown one, one without a policy, or a policy of another number
@@ -129,7 +136,7 @@ def evaluate(
         "episodes": parameters.episodes,
         "seed": parameters.seed,
         "schemes": {
-            scheme: _returns(flown, scheme) | _account(flights.totals, scenario)
+            scheme: _returns(flown, scheme, upper_bounds or {}) | _account(flights.totals, scenario)
             for scheme, flights in flown.items()
         },
         **told,
@@ -221,8 +228,16 @@ def _together(several: Sequence[Flights]) -> Flights:
 
 
 def _per_slot(after: TensorDictBase) -> dict[str, Tensor]:
-    """How the helper flew and what each node spent in one slot: (learners, episodes)."""
+    """How the helpers flew and what each node spent in one slot: (learners, episodes).
+
+    Of several helpers it is the sum, and of shares the mean; those of each follow, numbered.
+    """
     diagnostics = after["diagnostics"]
+    several: dict[str, Tensor] = {}
+    if after["mode"].shape[-1] > 1:
+        several |= _of_helpers("relay_share", after["mode"].float())
+        several |= _of_helpers("off_map", after["off_map"])
+        several |= _of_helpers("helper_energy", diagnostics["helper_energy"])
     return {
         "secrecy_sum_rate": secrecy_sum_rate(after),
         "relay_share": after["mode"].float().mean(dim=-1),
@@ -232,6 +247,7 @@ def _per_slot(after: TensorDictBase) -> dict[str, Tensor]:
         "ue_energy": diagnostics["ue_energy"].mean(dim=-1),
         "edge_energy": diagnostics["edge_energy"].squeeze(-1),
         "helper_energy": diagnostics["helper_energy"].sum(dim=-1),
+        **several,
     }
 
 
@@ -240,7 +256,9 @@ def secrecy_sum_rate(flown: TensorDictBase) -> Tensor:
     return flown["diagnostics", "secrecy_rate"].sum(dim=-1)
 
 
-def _returns(flown: Mapping[str, Flights], scheme: str) -> dict[str, Any]:
+def _returns(
+    flown: Mapping[str, Flights], scheme: str, upper_bounds: Mapping[str, float]
+) -> dict[str, Any]:
     """Mean returns with intervals, and as a fraction of the optima flown in the same draws."""
     returns = {name: flights.earned.numpy() for name, flights in flown.items()}
     mean = float(returns[scheme].mean())
@@ -255,6 +273,10 @@ def _returns(flown: Mapping[str, Flights], scheme: str) -> dict[str, Any]:
     ):
         if optimum in returns and returns[optimum].mean() > 0:
             result[field] = mean / float(returns[optimum].mean())
+    if (bound := upper_bounds.get(SCHEMES[scheme].optimum)) is not None:
+        result["upper_bound"] = bound
+        if bound > 0:
+            result["fraction_of_upper_bound"] = mean / bound
     return result
 
 
@@ -279,7 +301,7 @@ def _account(totals: Mapping[str, Tensor], scenario: Scenario) -> dict[str, Any]
     """How the helper flew and what each node spent, per episode; shares are of all slots."""
     per_episode = {name: float(values.mean()) for name, values in totals.items()}
     return {
-        name: value / scenario.num_slots if name.endswith("_share") else value
+        name: value / scenario.num_slots if "_share" in name else value
         for name, value in per_episode.items()
         if name not in RETURNS
     }
@@ -288,7 +310,8 @@ def _account(totals: Mapping[str, Tensor], scenario: Scenario) -> dict[str, Any]
 def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
     """Flights (episodes, T) as a table with a row per slot; lists hold one entry per UE.
 
-    With several helpers, whose numbers are columns ``x_1``, ``x_2`` and so on.
+    With several helpers, whose numbers are columns ``x_1``, ``x_2`` and so on, :data:`WAY` tells
+    how each UE sends.
     """
     episodes, num_slots = flown.batch_size
     diagnostics = flown["diagnostics"]
@@ -313,15 +336,19 @@ def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
             for name, values in columns.items()
         }
     )
-    for name in ("offloading", "secrecy_rate", "ue_energy"):
+    for name in PER_UE if flown["mode"].shape[-1] == 1 else (*PER_UE, WAY):
         table[name] = diagnostics[name].flatten(0, 1).tolist()
     return table
 
 
 def _of_helpers(name: str, values: Tensor) -> dict[str, Tensor]:
     """A column of values (..., H) for each helper, numbered where there are several."""
-    several = values.shape[-1] > 1
-    return {
-        f"{name}_{number}" if several else name: own
-        for number, own in enumerate(values.unbind(dim=-1), start=1)
-    }
+    names = helper_columns(name, values.shape[-1])
+    return dict(zip(names, values.unbind(dim=-1), strict=True))
+
+
+def helper_columns(name: str, num_helpers: int) -> list[str]:
+    """What a quantity of the helpers is called in a table: ``x``, or ``x_1``, ``x_2`` of two."""
+    if num_helpers == 1:
+        return [name]
+    return [f"{name}_{number}" for number in range(1, num_helpers + 1)]

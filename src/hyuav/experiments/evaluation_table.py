@@ -8,9 +8,9 @@ from rich.console import Console
 
 from hyuav._support.errors import harmless
 from hyuav._support.formatting import interval, percent
-from hyuav._support.terminal import print_table, results_table
+from hyuav._support.terminal import print_line, print_table, results_table
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.experiments.schemes import LABELS
+from hyuav.experiments.schemes import LABELS, OPTIMA
 
 WIDTH = 18
 """Of the heading of what is earned."""
@@ -24,12 +24,17 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         f"{summary['episodes']} episodes on the same fading, 95 % interval"
     )
     earned = "\n".join(wrap(earned_title(summary), WIDTH, break_on_hyphens=False))
-    beside = "sum-rate\n(bps/Hz)" if "reward" in summary else "hybrid\noptimum"
-    columns = "own\noptimum", beside, "relay\nslots", "UEs off-\nloading", "off\nmap"
+    bounded = is_bounded(summary)
+    own = "of lower\nbound" if bounded else "own\noptimum"
+    hybrid = "of upper\nbound" if bounded else "hybrid\noptimum"
+    beside = "sum-rate\n(bps/Hz)" if "reward" in summary else hybrid
+    columns = own, beside, "relay\nslots", "UEs off-\nloading", "off\nmap"
     table = results_table(title, "Scheme", earned, *columns)
     for scheme, result in summary["schemes"].items():
         table.add_row(LABELS[scheme], *flight_cells(result))
     print_table(table, console)
+    if bounded:
+        print_line(upper_bounds(summary), console)
     for scheme, result in summary["schemes"].items():
         if result["budget_violations"] > 0:
             count = f"{result['budget_violations']:.2f}"
@@ -45,6 +50,22 @@ def earned_title(summary: Mapping[str, Any]) -> str:
     return f"{title} ({unit})" if unit else title
 
 
+def is_bounded(summary: Mapping[str, Any]) -> bool:
+    """Whether the optima are lower bounds, beside which upper ones stand: with several helpers."""
+    return any("upper_bound" in result for result in summary["schemes"].values())
+
+
+def upper_bounds(summary: Mapping[str, Any]) -> str:
+    """What no flight earns, of each optimum that has an upper bound, in a sentence."""
+    schemes = summary["schemes"]
+    told = [
+        f"{schemes[name]['upper_bound']:.2f} ({LABELS[name]})"
+        for name in OPTIMA.values()
+        if "upper_bound" in schemes.get(name, {})
+    ]
+    return f"no flight exceeds {', '.join(told)} bps/Hz"
+
+
 def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
     """How a scheme flew, as text.
 
@@ -53,17 +74,22 @@ def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
 
     Returns:
         what it earned with its interval, the fraction of the scheme's own optimum, that of the
-        hybrid optimum or, where another reward was earned, the secrecy sum-rate, the shares of
-        relay slots and of UEs offloading, and the slots off the map.
+        hybrid optimum or of the upper bound of the scheme's own or, where another reward was
+        earned, the secrecy sum-rate, the shares of relay slots and of UEs offloading, and the slots
+        off the map.
     """
     rate = result.get("reward", result["secrecy_sum_rate"])
     mean, (low, high) = rate["mean"], rate["ci95"]
     digits = 1 if "reward" in result and abs(mean) >= 100.0 else 2
-    hybrid = percent(result.get("fraction_of_hybrid_optimum"))
+    beside = "fraction_of_hybrid_optimum"
+    if "upper_bound" in result:
+        beside = "fraction_of_upper_bound"
     return (
         interval(mean, low, high, digits),
         percent(result.get("fraction_of_optimum")),
-        f"{result['secrecy_sum_rate']['mean']:.2f}" if "reward" in result else hybrid,
+        f"{result['secrecy_sum_rate']['mean']:.2f}"
+        if "reward" in result
+        else percent(result.get(beside)),
         percent(result["relay_share"]),
         percent(result["offloading_share"]),
         f"{result['off_map']:.1f}",

@@ -1,6 +1,7 @@
 """The ways to fly that an evaluation takes: the actors of trainings, and the references."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from rich.console import Console
 from tensordict.nn import TensorDictModuleBase
@@ -91,10 +92,22 @@ def straight_policies(scenario: Scenario) -> tuple[Policies, list[str]]:
     return policies, left_out
 
 
-def reference_policies(
+class References(NamedTuple):
+    """What flights are measured against."""
+
+    policies: Policies
+    upper_bounds: dict[str, float]
+    """By scheme of an optimum, where the optimum is not exact: what no flight earns, in the unit of
+    the reward."""
+
+
+def references(
     scenario: Scenario, resolution: float | None, console: Console, reward: Reward = DEFAULT
-) -> Policies:
-    """Re-LT, Ja-LT and the exact optimum of each mode rule, where there is one.
+) -> References:
+    """Re-LT, Ja-LT and the optimum of each mode rule, where there is one.
+
+    Of one helper it is exact on a grid; of several it is the best flight that was found, and the
+    upper bound tells how much better another one may be.
 
     Args:
         scenario: to fly.
@@ -107,9 +120,10 @@ def reference_policies(
         print_line(line, console)
     if (reason := why_no_optimum(reward, scenario)) is not None:
         print_line(f"reward = {reward.name}: {reason}", console)
-        return policies
+        return References(policies, {})
     with make_progress(console, "optima") as progress:
         optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario, optimum.share)]
-    return policies
+    bounds = {OPTIMA[rule]: optimum.upper_bound for rule, optimum in optima.items()}
+    return References(policies, {name: own for name, own in bounds.items() if own is not None})

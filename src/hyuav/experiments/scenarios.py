@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from hyuav._support.errors import InputError, rejection, require_choice
+from hyuav._support.errors import require_choice
 from hyuav._support.parameters import mapping
 from hyuav.physics.families import LAYOUTS, drawn_scenario
 from hyuav.physics.scenario import PRESETS, Scenario
@@ -18,8 +18,7 @@ def named_scenario(values: object) -> tuple[str, Scenario]:
     the name of a layout gets the seed behind it.
 
     Raises:
-        InputError: an unknown name or field, or an unacceptable value, among which are several
-            helpers or eavesdroppers, whose flights no report can draw yet.
+        InputError: an unknown name or field, or an unacceptable value.
     """
     if isinstance(values, str):
         return named_scenario({"name": values, **offered(values)})
@@ -29,13 +28,8 @@ def named_scenario(values: object) -> tuple[str, Scenario]:
         scenario, seed = drawn_scenario(fields)
         name = f"{name}-{seed}" if name == fields["layout"] else name
     else:
-        if "ue_positions" not in fields and name in PRESETS:
-            fields["ue_positions"] = PRESETS[name]
-        scenario = Scenario.from_dict(fields)
-    for field in ("helper_starts", "eavesdropper_positions"):
-        if len(positions := getattr(scenario, field)) > 1:
-            accepted = "one position: runs of several are flown and trained in Python so far"
-            raise InputError(rejection(f"scenario.{field}", positions, accepted))
+        preset = PRESETS[name].to_dict() if name in PRESETS else {}
+        scenario = Scenario.from_dict({**preset, **fields})
     return name, scenario
 
 

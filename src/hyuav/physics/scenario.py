@@ -1,7 +1,8 @@
 """What is fixed in an experiment: the node positions and the paper's parameter table."""
 
+import dataclasses
 from collections.abc import Sequence
-from typing import Annotated, Any, Self, TypeGuard
+from typing import Annotated, Any, TypeGuard
 
 from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic.dataclasses import dataclass
@@ -23,20 +24,6 @@ Points = Annotated[
         description="at least one pair of coordinates (x, y) in metres",
     ),
 ]
-
-PRESETS: dict[str, tuple[Point, ...]] = {
-    "random_disk": (
-        *((23.0, 13.0), (2.0, 30.0), (9.0, -26.0), (-28.0, -16.0), (30.0, 20.0)),
-        *((-37.0, 17.0), (-22.0, 3.0), (18.0, 29.0), (-3.0, -35.0), (17.0, 15.0)),
-    ),
-    "two_clusters": (
-        *((-10.0, 18.0), (-20.0, 18.0), (-26.0, 29.0), (-25.0, 26.0), (-19.0, 15.0)),
-        *((-32.0, 12.0), (-35.0, 20.0), (26.0, -16.0), (18.0, -30.0), (23.0, -20.0)),
-    ),
-}
-"""UE positions in metres of the two layouts that reproduce the paper's figures 3a and 3b."""
-
-Preset = Annotated[str, OneOf(*PRESETS)]
 
 # Wider than any real value, and narrow enough for all that follows from them to be in float32.
 Length = Annotated[float, Field(ge=1e-6, le=1e9)]
@@ -192,15 +179,52 @@ class Scenario(Parameters):
         return 3 if self.power_control else 2
 
     @classmethod
-    def preset(cls, name: str) -> Self:
-        """The layout called ``name`` with the paper's parameters.
+    def preset(cls, name: str) -> "Scenario":
+        """The scenario called ``name``, of :data:`PRESETS`.
 
         Raises:
             InputError: ``name`` is not in :data:`PRESETS`.
         """
         require_choice("scenario", name, PRESETS)
-        return cls(ue_positions=PRESETS[name])
+        return PRESETS[name]
 
+
+_TWO_CLUSTERS = Scenario(
+    ue_positions=(
+        *((-10.0, 18.0), (-20.0, 18.0), (-26.0, 29.0), (-25.0, 26.0), (-19.0, 15.0)),
+        *((-32.0, 12.0), (-35.0, 20.0), (26.0, -16.0), (18.0, -30.0), (23.0, -20.0)),
+    )
+)
+
+PRESETS: dict[str, Scenario] = {
+    "random_disk": Scenario(
+        ue_positions=(
+            *((23.0, 13.0), (2.0, 30.0), (9.0, -26.0), (-28.0, -16.0), (30.0, 20.0)),
+            *((-37.0, 17.0), (-22.0, 3.0), (18.0, 29.0), (-3.0, -35.0), (17.0, 15.0)),
+        )
+    ),
+    "two_clusters": _TWO_CLUSTERS,
+    "two_eavesdroppers": dataclasses.replace(
+        _TWO_CLUSTERS,
+        eavesdropper_positions=((80.0, 80.0), (-80.0, 60.0)),
+        helper_starts=((-60.0, -60.0), (60.0, -60.0)),
+    ),
+    "contested": Scenario(
+        ue_positions=(
+            *((-80.0, -40.0), (-70.0, -55.0), (-60.0, -70.0), (-85.0, -60.0), (-65.0, -45.0)),
+            *((70.0, 60.0), (60.0, 75.0), (80.0, 50.0), (75.0, 70.0), (55.0, 60.0)),
+        ),
+        eavesdropper_positions=((-60.0, -50.0), (60.0, 55.0)),
+        eavesdropper_altitude=100.0,
+        helper_starts=((0.0, 0.0), (0.0, 0.0)),
+        coverage_radius=120.0,
+        jamming_power=1e-4,
+    ),
+}
+"""Scenarios by name: two layouts that reproduce the paper's figures 3a and 3b, one of them with two
+eavesdroppers and two helpers, and one in which nothing is secret without helpers."""
+
+Preset = Annotated[str, OneOf(*PRESETS)]
 
 ScenarioLike = Scenario | str | Sequence[Point]
 """A scenario, a preset's name, or UE positions in m, all else being as in the paper."""

@@ -105,7 +105,7 @@ def solve_optimum(
     draws: int | None = None,
     evaluation_draws: int = 10_000,
     seed: int = 0,
-    certify: bool = False,
+    certify: bool | None = None,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
     reward: Reward | Source | str = SUM_RATE,
 ) -> dict[str, Optimum]:
@@ -124,8 +124,7 @@ def solve_optimum(
             :data:`FEW_DRAWS`.
         evaluation_draws: of whole episodes, from which the flight's value is estimated.
         seed: of all draws; not used where no slot is random.
-        certify: give the upper bound too, which takes some seconds; always given for several
-            helpers.
+        certify: give the upper bound too, which takes some seconds; None for several helpers only.
         track: passes on the mode rules one by one, as what shows the progress does.
         reward: what a slot earns, as for :func:`hyuav.make_env`; the mode is chosen by the secrecy
             sum-rate whatever it is. There is no optimum of one that does not add up over slots.
@@ -166,7 +165,7 @@ def solve_horizons(
     draws: int | None = None,
     evaluation_draws: int = 10_000,
     seed: int = 0,
-    certify: bool = False,
+    certify: bool | None = None,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
     reward: Reward | Source | str = SUM_RATE,
 ) -> dict[str, dict[int, Optimum]]:
@@ -182,7 +181,7 @@ def solve_horizons(
         draws: that the expected reward is averaged over.
         evaluation_draws: from which each flight's value is estimated.
         seed: of all draws.
-        certify: give upper bounds too.
+        certify: give upper bounds too; None for several helpers only.
         track: passes on the mode rules.
         reward: what a slot earns.
 
@@ -220,7 +219,7 @@ def solve_horizons(
     else:
         planner = SeveralHelpers(physics, resolution, power_step, draws, map_seed)
     bounds = None
-    if reward == DEFAULT and (certify or not one):
+    if reward == DEFAULT and (not one if certify is None else certify):
         bounds = CellBounds(physics, map_seed)
     optima: dict[str, dict[int, Optimum]] = {}
     for mode_rule in track(mode_rules):

@@ -18,12 +18,14 @@ from hyuav.experiments.comparison.plan import parameters_of, training_episodes
 from hyuav.experiments.comparison.shards import Shard
 from hyuav.experiments.evaluation import EvaluationParameters, fly
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
+from hyuav.experiments.schemes import OPTIMA
 from hyuav.experiments.tracking import LoggerParameters, Tracker
 from hyuav.experiments.train import train
 from hyuav.learning.learners import Learner
 from hyuav.learning.policy import learned_policy
 from hyuav.learning.registry import PEER
 from hyuav.learning.training import Training, TrainingParameters
+from hyuav.references import bounds
 from hyuav.references.optimum import solve_optimum
 
 TRAINING = TrainingParameters(
@@ -62,8 +64,27 @@ def test_the_optima_are_kept_as_they_were_found(optima: Optima) -> None:
         path = optima.policy(scheme, 6).get_buffer("path")
         assert np.array_equal(path, optimum.path)
     assert len(optima.policy("relay", 8).get_buffer("path")) == 9
+    assert optima.upper_bound("relay", 8) is None
     kept = pd.read_parquet(optima.file).query("num_slots == 6").groupby("scheme")["value"].first()
     assert kept.to_dict() == {scheme: optimum.value for scheme, optimum in found.items()}
+
+
+def test_the_optima_of_several_helpers_are_kept_with_their_upper_bounds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bounds, "MOST_RATES", 10**5)  # which makes them coarse
+    two = dataclasses.replace(Scenario.preset("two_eavesdroppers"), num_slots=2, fading=False)
+    optima = Optima(two, (2,), 20.0, tmp_path / "two.parquet")
+    optima.solve()
+    assert optima.is_solved
+    kept = pd.read_parquet(optima.file)
+    assert {"x_1", "y_2", "power_2"} < set(kept.columns)
+    for scheme in OPTIMA:
+        path = optima.policy(scheme, 2).get_buffer("path")
+        assert path[0].tolist() == [list(start) for start in two.helper_starts]
+        bound = optima.upper_bound(scheme, 2)
+        assert bound is not None
+        assert bound >= kept[kept["scheme"] == scheme]["value"].iloc[0]
 
 
 def test_a_training_is_evaluated_in_the_episodes_that_its_optimum_flies() -> None:

@@ -13,7 +13,7 @@ from hyuav.experiments.comparison.statistics import (
     summarize_cells,
 )
 from hyuav.experiments.comparison.summary import Summary
-from hyuav.experiments.comparison.tables import label, print_tables
+from hyuav.experiments.comparison.tables import label, print_tables, upper_bounds
 
 
 def printed(algorithms: list[str], capsys: pytest.CaptureFixture[str]) -> list[str]:
@@ -43,6 +43,18 @@ def printed(algorithms: list[str], capsys: pytest.CaptureFixture[str]) -> list[s
     pairs = next(i for i, line in enumerate(lines) if "P(row" in line)
     assert max(len(line.rstrip()) for line in lines) <= 80
     return lines[pairs:]
+
+
+def test_where_the_optimum_is_a_lower_bound_the_upper_one_is_told() -> None:
+    one = {"scenario": "two_clusters", "num_slots": 10, "scheme": "relay", "optimum": 7.0}
+    results = pd.DataFrame(
+        [one, *[one | {"scenario": "contested", "optimum": 400.0, "upper_bound": 496.1}] * 2]
+    )
+    assert upper_bounds(results) == [
+        "contested, T = 10, relay: the optimum is the best flight that was found, 400.00; "
+        "no flight earns more than 496.10"
+    ]
+    assert upper_bounds(results.drop(columns="upper_bound")) == []
 
 
 def test_few_algorithms_are_set_beside_each_other(capsys: pytest.CaptureFixture[str]) -> None:

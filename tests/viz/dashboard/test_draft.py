@@ -15,7 +15,7 @@ SCENARIO = Scenario.preset("two_clusters")
 def test_every_field_of_a_scenario_can_be_edited_once() -> None:
     edited = [
         *drafts.NODES,
-        "ue_positions",
+        drafts.COLLUSION,
         *(n for group in drafts.GROUPS.values() for n in group),
     ]
     assert sorted(edited) == sorted(field.name for field in dataclasses.fields(Scenario))
@@ -59,8 +59,9 @@ def test_nodes_are_moved_added_and_taken_away() -> None:
     draft = SCENARIO.to_dict()
     draft = drafts.moved(draft, "eavesdropper (E)", (70.0, -5.0))
     draft = drafts.moved(draft, "UE 2", (1.0, 2.0))
-    draft = drafts.with_ue(draft, (3.0, 4.0))
-    draft = drafts.without_ue(draft, "UE 1")
+    draft, name = drafts.with_node(draft, "ue_positions", (3.0, 4.0))
+    assert name == "UE 11"
+    draft = drafts.without_node(draft, "UE 1")
     changed = Scenario.from_dict(draft)
     assert changed.eavesdropper_positions[0] == (70.0, -5.0)
     assert changed.ue_positions[0] == drafts.position(draft, "UE 1") == (1.0, 2.0)
@@ -69,10 +70,26 @@ def test_nodes_are_moved_added_and_taken_away() -> None:
     assert set(drafts.changes(changed, SCENARIO)) == {"eavesdropper_positions", "ue_positions"}
 
 
-def test_the_only_ue_stays() -> None:
-    draft = {**SCENARIO.to_dict(), "ue_positions": [(1.0, 2.0)]}
-    with pytest.raises(InputError, match="at least one UE"):
-        drafts.without_ue(draft, "UE 1")
+def test_one_of_several_helpers_is_moved_and_the_others_stay() -> None:
+    draft = Scenario.preset("contested").to_dict()
+    draft, name = drafts.with_node(draft, "helper_starts", (5.0, 6.0))
+    assert name == "helper's start (H) 3"
+    draft = drafts.moved(draft, "helper's start (H) 2", (1.0, 2.0))
+    draft = drafts.moved(draft, "eavesdropper (E) 1", (3.0, 4.0))
+    changed = Scenario.from_dict(draft)
+    assert changed.helper_starts == ((0.0, 0.0), (1.0, 2.0), (5.0, 6.0))
+    assert changed.eavesdropper_positions == ((3.0, 4.0), (60.0, 55.0))
+    assert drafts.position(draft, "helper's start (H) 2") == (1.0, 2.0)
+    draft = drafts.without_node(draft, "helper's start (H) 1")
+    assert Scenario.from_dict(draft).helper_starts == ((1.0, 2.0), (5.0, 6.0))
+
+
+@pytest.mark.parametrize("node", ["eavesdropper (E)", "helper's start (H)", "legitimate UAV (L)"])
+def test_the_only_node_of_its_kind_stays(node: str) -> None:
+    draft = SCENARIO.to_dict()
+    assert not drafts.can_leave(draft, node)
+    with pytest.raises(InputError, match="at least one position"):
+        drafts.without_node(draft, node)
 
 
 def test_a_saved_scenario_is_one_that_the_recipes_take(call: Call, tmp_path: Path) -> None:
@@ -91,7 +108,7 @@ def test_a_saved_scenario_is_one_that_the_recipes_take(call: Call, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    "name", ["", "..", "a/b", "../x", "-x", "a.b", "x" * 65, "é", "two_clusters"]
+    "name", ["", "..", "a/b", "../x", "-x", "a.b", "x" * 65, "é", "contested", "disk"]
 )
 def test_a_name_that_is_no_plain_new_word_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match=r"^name = "):

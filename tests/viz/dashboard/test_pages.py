@@ -250,6 +250,30 @@ def test_a_node_is_moved_by_its_coordinates(tmp_path: Path) -> None:
     )
 
 
+def test_helpers_and_eavesdroppers_are_added_and_one_of_them_is_moved(tmp_path: Path) -> None:
+    short = dataclasses.replace(SCENARIO, num_slots=3, fading=False)
+    save(short, tmp_path, "short")
+    page = opened(_explorer, tmp_path)
+    page.selectbox(key="begin").set_value("saved short").run()
+    next(own for own in page.button if own.label == "Add an eavesdropper").click().run()
+    assert page.selectbox(key="node").value == "eavesdropper (E) 2"
+    widget(page, "number_input", "x (m)").set_value(-80.0).run()
+    widget(page, "selectbox", "Eavesdroppers").set_value("colluding").run()
+    next(own for own in page.button if own.label == "Add a helper").click().run()
+    widget(page, "number_input", "x (m)").set_value(60.0).run()
+    assert errors(page) == []
+    assert page.session_state["valid"] == dataclasses.replace(
+        short,
+        eavesdropper_positions=((80.0, 80.0), (-80.0, 80.0)),
+        eavesdroppers="colluding",
+        helper_starts=((-60.0, -60.0), (60.0, -60.0)),
+    )
+    assert any("best flight that was found" in own.value for own in page.caption)
+    next(own for own in page.button if own.label == "Remove this node").click().run()
+    assert page.session_state["valid"].num_helpers == 1
+    assert errors(page) == []
+
+
 def test_a_checkpoint_flies_in_the_changed_scenario_until_it_does_not_fit(
     trained_runs: Path,
 ) -> None:
@@ -257,7 +281,7 @@ def test_a_checkpoint_flies_in_the_changed_scenario_until_it_does_not_fit(
     page.selectbox(key="pilot").set_value("tiny").run()
     assert [own.label for own in page.metric] == ["Optimum", "Proposed"]
     assert "of the optimum" in page.metric[1].delta
-    next(button for button in page.button if button.label == "Remove this UE").click().run()
+    next(button for button in page.button if button.label == "Remove this node").click().run()
     assert errors(page) == ["number of UEs = 9: expected 10, for which the checkpoint was trained"]
     assert [own.label for own in page.metric] == ["Optimum"]
 

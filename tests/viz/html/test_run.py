@@ -10,7 +10,7 @@ from rich.console import Console
 
 from hyuav.experiments.elsewhere import horizon_directory
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
-from hyuav.experiments.policies import reference_policies
+from hyuav.experiments.policies import references
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.html.document import Page, Section
 from hyuav.viz.html.run import run_page
@@ -28,7 +28,7 @@ def _sections(page: Page) -> dict[str, Section]:
 def shorter(trained: RunDirectory) -> Evaluation:
     """Over eight slots, where the run's own evaluation is over twelve."""
     scenario = dataclasses.replace(trained.configuration().scenario, num_slots=8)
-    policies = reference_policies(scenario, 10.0, Console(quiet=True))
+    policies = references(scenario, 10.0, Console(quiet=True)).policies
     return evaluate(scenario, "two_clusters", policies, EvaluationParameters(episodes=4, flights=1))
 
 

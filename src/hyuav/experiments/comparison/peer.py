@@ -10,6 +10,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.spaces import flatdim
 from numpy.typing import NDArray
 from stable_baselines3.common.noise import ActionNoise
 from stable_baselines3.common.vec_env import DummyVecEnv
@@ -22,16 +23,18 @@ class DecayingNoise(ActionNoise):
         variance: in the first slot, in units of v_max squared.
         decay: factor of the standard deviation.
         seed: of the noise.
+        size: of an action.
     """
 
-    def __init__(self, variance: float, decay: float, seed: int) -> None:
+    def __init__(self, variance: float, decay: float, seed: int, size: int = 2) -> None:
         super().__init__()
+        self._size = size
         self._std, self._decay = variance**0.5, decay
         self._rng = np.random.default_rng(seed)
 
     def __call__(self) -> NDArray[np.float32]:
-        """The noise of one slot (2,), in units of v_max."""
-        noise = self._std * self._rng.standard_normal(2, dtype=np.float32)
+        """The noise of one slot (size,), in units of v_max."""
+        noise = self._std * self._rng.standard_normal(self._size, dtype=np.float32)
         self._std *= self._decay
         return noise
 
@@ -82,7 +85,7 @@ def ddpg_model(
         gamma=discount,
         train_freq=1,
         gradient_steps=1,
-        action_noise=DecayingNoise(noise_variance, noise_decay, seed),
+        action_noise=DecayingNoise(noise_variance, noise_decay, seed, flatdim(env.action_space)),
         policy_kwargs={"net_arch": [*hidden_sizes], "activation_fn": activation},
         seed=seed,
         **options,

@@ -214,7 +214,8 @@ class Shard:
 
         Returns:
             ``results``, a row for each learner: ``sum_rate``, what it ``earned``, the ``optimum``
-            of its mode rule in the same episodes, and the ratio of both, ``fraction``;
+            of its mode rule in the same episodes, and the ratio of both, ``fraction``; where the
+            optimum is only the best flight that was found, ``upper_bound``, what no flight earns;
             ``episodes_to_threshold`` and ``seconds_to_threshold`` at the first evaluation at which
             the best weights so far earned the threshold's share of what the optimum earns in that
             evaluation's episodes, NaN where none did; ``seconds`` in all; and ``stopped``, the
@@ -240,12 +241,14 @@ class Shard:
             by = "sum_rate" if self.configuration.reward == DEFAULT else "evaluation"
             curve = _curve(own, in_training[learner.scheme], by)
             optimum = in_evaluation[learner.scheme]
+            bound = self.optima.upper_bound(learner.scheme, identity["num_slots"])
             results.append(
                 {
                     **identity,
                     "sum_rate": sum_rates[index],
                     "earned": earned[index],
                     "optimum": optimum,
+                    **({} if bound is None else {"upper_bound": bound}),
                     "fraction": earned[index] / optimum,
                     **_first_solved(curve, self.threshold),
                     "seconds": own["seconds"].iloc[-1] if len(own) else 0.0,

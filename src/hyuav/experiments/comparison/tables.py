@@ -54,6 +54,25 @@ def stopped(results: pd.DataFrame) -> list[str]:
     ]
 
 
+def upper_bounds(results: pd.DataFrame) -> list[str]:
+    """A line for each cell whose optimum is only the best flight that was found.
+
+    Args:
+        results: a row for each learner, as :meth:`.shards.Shard.tables` gives them.
+    """
+    if not {"upper_bound", "optimum"} <= set(results):
+        return []
+    numbers = {name: finite_numbers(results[name]) for name in ("upper_bound", "optimum")}
+    known = results.assign(**numbers).dropna(subset=[*numbers])
+    return [
+        f"{scenario}, T = {num_slots}, {scheme}: the optimum is the best flight that was found, "
+        f"{own['optimum'].iloc[0]:.2f}; no flight earns more than {own['upper_bound'].iloc[0]:.2f}"
+        for (scenario, num_slots, scheme), own in known.groupby(
+            ["scenario", "num_slots", "scheme"], sort=False
+        )
+    ]
+
+
 def print_tables(summary: Summary, threshold: float, console: Console) -> None:
     """Print the cells of each scenario and horizon, what is told of each algorithm, who stopped.
 
@@ -72,7 +91,7 @@ def print_tables(summary: Summary, threshold: float, console: Console) -> None:
         print_table(_algorithms("Random layouts", summary.layouts, threshold), console)
     if len(summary.improvements):
         print_table(_improvements(summary.improvements), console)
-    for line in stopped(summary.results):
+    for line in (*upper_bounds(summary.results), *stopped(summary.results)):
         print_line(line, console)
 
 

@@ -10,17 +10,31 @@ from typing import Any
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import OneOf, declared
 from hyuav.envs.rendering import EAVESDROPPER_LABEL, LEGITIMATE_LABEL
-from hyuav.physics.scenario import PRESETS, Point, Scenario
+from hyuav.experiments.scenarios import NAMES
+from hyuav.physics.scenario import Point, Scenario
 
 Draft = dict[str, Any]
 """A value for each field of :class:`Scenario`: its own, or the text that was typed in."""
 
+LEGITIMATE = "legitimate_position"
+
 NODES = {
-    "legitimate_position": LEGITIMATE_LABEL,
+    "ue_positions": "UE",
+    LEGITIMATE: LEGITIMATE_LABEL,
     "eavesdropper_positions": EAVESDROPPER_LABEL,
     "helper_starts": "helper's start (H)",
 }
-"""The nodes that every scenario has, beside the UEs."""
+"""What can be moved, by the field that holds its position or positions."""
+
+SEVERAL = {
+    "ue_positions": "UE",
+    "eavesdropper_positions": "eavesdropper",
+    "helper_starts": "helper",
+}
+"""The fields of which a scenario may have more or fewer positions, and what stands there."""
+
+COLLUSION = "eavesdroppers"
+"""The field that tells whether eavesdroppers work together, which is shown with the nodes."""
 
 _FLIGHT = (
     *("num_slots", "slot_duration", "max_speed", "speed_limit", "off_map_penalty"),
@@ -33,7 +47,7 @@ _TASKS = (
 
 FIELDS = {field.name: field for field in dataclasses.fields(Scenario)}
 
-_RADIO = tuple(name for name in FIELDS if name not in (*NODES, "ue_positions", *_FLIGHT, *_TASKS))
+_RADIO = tuple(name for name in FIELDS if name not in (*NODES, COLLUSION, *_FLIGHT, *_TASKS))
 
 GROUPS = {"Flight": _FLIGHT, "Radio": _RADIO, "Tasks": _TASKS}
 """All parameters but the positions; what has no other group is of the radio."""
@@ -84,59 +98,78 @@ def _number(text: str) -> Any:
         return text.strip()
 
 
-def nodes(draft: Draft) -> list[str]:
-    """What can be moved: the UEs, numbered from 1, and the UAVs."""
-    return [*(f"UE {n}" for n in range(1, len(draft["ue_positions"]) + 1)), *NODES.values()]
+def nodes(draft: Draft) -> dict[str, tuple[str, int]]:
+    """What can be moved, by name: its field, and its place among the field's positions.
+
+    UEs are numbered from 1, and so are helpers and eavesdroppers where there are several.
+    """
+    found: dict[str, tuple[str, int]] = {}
+    for field, name in NODES.items():
+        count = 1 if field == LEGITIMATE else len(draft[field])
+        numbered = field == "ue_positions" or count > 1
+        for index in range(count):
+            found[f"{name} {index + 1}" if numbered else name] = field, index
+    return found
 
 
 def position(draft: Draft, node: str) -> Point:
     """Where a node is, in m."""
-    if node.startswith("UE "):
-        x, y = draft["ue_positions"][int(node[3:]) - 1]
-    else:
-        place = draft[_field(node)]
-        x, y = place if _field(node) == "legitimate_position" else place[0]
+    field, index = nodes(draft)[node]
+    x, y = draft[field] if field == LEGITIMATE else draft[field][index]
     return float(x), float(y)
 
 
 def moved(draft: Draft, node: str, to: Point) -> Draft:
     """The draft with a node elsewhere."""
-    if not node.startswith("UE "):
-        field = _field(node)
-        return {**draft, field: to if field == "legitimate_position" else [to]}
-    ues = list(draft["ue_positions"])
-    ues[int(node[3:]) - 1] = to
-    return {**draft, "ue_positions": ues}
+    field, index = nodes(draft)[node]
+    if field == LEGITIMATE:
+        return {**draft, field: to}
+    places = list(draft[field])
+    places[index] = to
+    return {**draft, field: places}
 
 
-def _field(node: str) -> str:
-    return next(field for field, label in NODES.items() if label == node)
+def with_node(draft: Draft, field: str, at: Point) -> tuple[Draft, str]:
+    """The draft with one node more, the last one of its field in :data:`SEVERAL`; and its name."""
+    grown = {**draft, field: [*draft[field], at]}
+    return grown, [name for name, (own, _) in nodes(grown).items() if own == field][-1]
 
 
-def with_ue(draft: Draft, at: Point) -> Draft:
-    """The draft with one UE more, the last one."""
-    return {**draft, "ue_positions": [*draft["ue_positions"], at]}
-
-
-def without_ue(draft: Draft, node: str) -> Draft:
-    """The draft without a UE; the later ones move up.
+def without_node(draft: Draft, node: str) -> Draft:
+    """The draft without a node; the later ones of its kind move up.
 
     Raises:
         InputError: it is the only one.
     """
-    ues = list(draft["ue_positions"])
-    if len(ues) == 1:
-        raise InputError("ue_positions: a scenario has at least one UE")
-    del ues[int(node[3:]) - 1]
-    return {**draft, "ue_positions": ues}
+    field, index = nodes(draft)[node]
+    if not can_leave(draft, node):
+        raise InputError(f"{field}: a scenario has at least one position")
+    places = list(draft[field])
+    del places[index]
+    return {**draft, field: places}
+
+
+def can_leave(draft: Draft, node: str) -> bool:
+    """Whether a node is not the only one of its kind."""
+    field, _ = nodes(draft)[node]
+    return field in SEVERAL and len(draft[field]) > 1
 
 
 def changes(scenario: Scenario, original: Scenario) -> dict[str, tuple[str, str]]:
-    """What differs from the scenario that was begun with: the old and the new value, as shown."""
+    """What differs from the scenario that was begun with: the old and the new value, as shown.
+
+    Of several positions nothing is shown.
+    """
     both: Mapping[str, tuple[object, object]] = {
         name: (getattr(original, name), getattr(scenario, name)) for name in FIELDS
     }
-    return {name: (shown(old), shown(new)) for name, (old, new) in both.items() if old != new}
+    return {name: _told(name, *pair) for name, pair in both.items() if pair[0] != pair[1]}
+
+
+def _told(name: str, old: Any, new: Any) -> tuple[str, str]:
+    if name in SEVERAL and max(len(old), len(new)) > 1:
+        return "", ""
+    return shown(old), shown(new)
 
 
 def save(scenario: Scenario, root: Path, name: str, *, replace: bool = False) -> Path:
@@ -154,8 +187,8 @@ def save(scenario: Scenario, root: Path, name: str, *, replace: bool = False) ->
     if _FILE_NAME.fullmatch(name) is None:
         accepted = "up to 64 letters, digits, '_' and '-', a letter or digit first"
         raise InputError(rejection("name", name, accepted))
-    if name in PRESETS:
-        raise InputError(rejection("name", name, f"another one than {', '.join(PRESETS)}"))
+    if name in NAMES:
+        raise InputError(rejection("name", name, f"another one than {', '.join(NAMES)}"))
     path = root / SCENARIOS / f"{name}.yaml"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

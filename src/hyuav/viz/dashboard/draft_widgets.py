@@ -4,6 +4,7 @@ from typing import Any
 
 import streamlit as st
 
+from hyuav.physics.scenario import LARGEST_NUMBER_OF_HELPERS
 from hyuav.viz.dashboard import draft as drafts
 from hyuav.viz.dashboard.draft import CHOICES, FIELDS, GROUPS, KINDS, Draft
 from hyuav.viz.dashboard.plain import ensure_offered
@@ -34,8 +35,8 @@ def _draft() -> Draft:
 
 
 def _nodes() -> None:
-    """A node's coordinates, and UEs to add and to take away."""
-    options = drafts.nodes(_draft())
+    """A node's coordinates, and nodes to add and to take away."""
+    options = list(drafts.nodes(_draft()))
     ensure_offered("node", options)
     node = st.selectbox("Node to move", options, key="node")
     coordinates = st.container(horizontal=True)
@@ -52,14 +53,21 @@ def _nodes() -> None:
         )
     st.caption("Or click on the map: the node moves there.")
     buttons = st.container(horizontal=True)
-    buttons.button("Add a UE", on_click=_add, width="stretch")
-    buttons.button(
-        "Remove this UE",
+    for field, name in drafts.SEVERAL.items():
+        article = "an" if name[0] in "aeio" else "a"
+        full = field == "helper_starts" and len(_draft()[field]) == LARGEST_NUMBER_OF_HELPERS
+        buttons.button(
+            f"Add {article} {name}", on_click=_add, args=(field,), disabled=full, width="stretch"
+        )
+    st.button(
+        "Remove this node",
         on_click=_remove,
         args=(node,),
-        disabled=not node.startswith("UE ") or len(_draft()["ue_positions"]) == 1,
+        disabled=not drafts.can_leave(_draft(), node),
         width="stretch",
     )
+    if len(_draft()["eavesdropper_positions"]) > 1:
+        _field(drafts.COLLUSION)
 
 
 def _move(key: str, node: str, axis: int) -> None:
@@ -74,16 +82,16 @@ def place(x: float, y: float) -> None:
     _renew_coordinates()
 
 
-def _add() -> None:
-    """A UE at the legitimate UAV, where it is seen and covered."""
-    at = drafts.position(_draft(), drafts.NODES["legitimate_position"])
-    st.session_state["draft"] = drafts.with_ue(_draft(), at)
-    st.session_state["node"] = f"UE {len(_draft()['ue_positions'])}"
+def _add(field: str) -> None:
+    """A node where the last one of its kind is, or a UE at the legitimate UAV, which covers it."""
+    draft = _draft()
+    last = draft[drafts.LEGITIMATE] if field == "ue_positions" else draft[field][-1]
+    st.session_state["draft"], st.session_state["node"] = drafts.with_node(draft, field, last)
     _renew_coordinates()
 
 
 def _remove(node: str) -> None:
-    st.session_state["draft"] = drafts.without_ue(_draft(), node)
+    st.session_state["draft"] = drafts.without_node(_draft(), node)
     _renew_coordinates()
 
 

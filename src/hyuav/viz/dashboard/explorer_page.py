@@ -129,7 +129,7 @@ def _tell_changes(scenario: Scenario) -> None:
     if not changes:
         return
     told = [
-        f"{drafts.label(name)}: {'other positions' if name == 'ue_positions' else f'{old} → {new}'}"
+        f"{drafts.label(name)}: {f'{old} → {new}' if old else 'other positions'}"
         for name, (old, new) in changes.items()
     ]
     st.caption(f"Changed: {plain('; '.join(told))}")
@@ -174,7 +174,7 @@ def _explore(index: RunIndex, scenario: Scenario) -> Evaluation | None:
             config={"displayModeBar": False},
         )
     if evaluation is not None:
-        _tell_accuracy(scenario, rule)
+        _tell_accuracy(scenario, rule, evaluation)
     return evaluation
 
 
@@ -251,13 +251,21 @@ def _place(key: str) -> None:
         place(float(points[0]["x"]), float(points[0]["y"]))
 
 
-def _tell_accuracy(scenario: Scenario, rule: str) -> None:
+def _tell_accuracy(scenario: Scenario, rule: str, evaluation: Evaluation) -> None:
     """How exactly the optimum is known, and a button to know it better."""
     fine = _is_refined(scenario, rule)
     spacing, draws = resolution(scenario, fine=fine), FINE_DRAWS if fine else COARSE_DRAWS
+    told, mapped = "The optimum is exact", "The map is"
+    if scenario.num_helpers > 1:
+        told, mapped = (
+            "The optimum is the best flight that was found",
+            "The map is of one alone and",
+        )
+    bound = evaluation.summary["schemes"][OPTIMA[rule]].get("upper_bound")
     st.caption(
-        f"The optimum is exact on a grid of {spacing:g} m with {draws} draws of the fading; "
-        f"means are of the same {EPISODES.episodes} episodes. The map is without fading."
+        f"{told} on a grid of {spacing:g} m with {draws} draws of the fading; "
+        f"{'' if bound is None else f'no flight earns more than {bound:.2f} bps/Hz; '}"
+        f"means are of the same {EPISODES.episodes} episodes. {mapped} without fading."
         f"{_OUTLINES if rule == 'hybrid' else ''}"
     )
     if not fine:

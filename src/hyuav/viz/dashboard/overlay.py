@@ -45,7 +45,7 @@ def explorer_map(scenario: Scenario, rule: str, quantity: str) -> go.Figure:
     figure.data[0].update(colorbar=_colorbar(QUANTITIES[quantity] + unit))
     figure.update_traces(showlegend=False, selector={"type": "contour"})
     figure.update_yaxes(constraintoward="top")  # on a narrow page the square leaves room below
-    figure.add_trace(_start(scenario))
+    figure.add_trace(_starts(scenario))
     figure.add_trace(_clickable(scenario))
     figure.for_each_trace(_stay_bright, selector={"type": "scatter"})
     figure.update_layout(
@@ -84,37 +84,39 @@ def _colorbar(title: str) -> dict[str, Any]:
 
 
 def _flight(flight: Flight) -> Iterator[go.Scatter]:
-    """The path on a white ground, a piece for each stretch in one mode."""
+    """The helpers' paths on a white ground, a piece for each stretch in one mode."""
     label, color = plain(scheme_label(flight.scheme)), scheme_color(flight.scheme)
     common = {"legendgroup": label, "hoverinfo": "skip"}
-    yield go.Scatter(
-        x=flight.path[:, 0],
-        y=flight.path[:, 1],
-        mode="lines",
-        line={"color": "white", "width": 6},
-        opacity=0.8,
-        showlegend=False,
-        **common,
-    )
-    for relay, first, last in runs_of_one_mode(flight.relay):
-        piece = flight.path[first : last + 1]
+    for helper, path in enumerate(flight.path.swapaxes(0, 1)):
         yield go.Scatter(
-            x=piece[:, 0],
-            y=piece[:, 1],
-            mode="lines+markers",
-            line={"color": color, "width": 3, "dash": "solid" if relay else "6px,4px"},
-            marker={"color": color, "size": 5},
-            name=label,
-            showlegend=first == 0,
+            x=path[:, 0],
+            y=path[:, 1],
+            mode="lines",
+            line={"color": "white", "width": 6},
+            opacity=0.8,
+            showlegend=False,
             **common,
         )
+        for relay, first, last in runs_of_one_mode(flight.relay[:, helper]):
+            piece = path[first : last + 1]
+            yield go.Scatter(
+                x=piece[:, 0],
+                y=piece[:, 1],
+                mode="lines+markers",
+                line={"color": color, "width": 3, "dash": "solid" if relay else "6px,4px"},
+                marker={"color": color, "size": 5},
+                name=label,
+                showlegend=helper == first == 0,
+                **common,
+            )
 
 
-def _start(scenario: Scenario) -> go.Scatter:
+def _starts(scenario: Scenario) -> go.Scatter:
     marker = {"symbol": "diamond", "size": 11, "color": HELPER_COLOR}
+    x, y = zip(*scenario.helper_starts, strict=True)
     return go.Scatter(
-        x=[scenario.helper_starts[0][0]],
-        y=[scenario.helper_starts[0][1]],
+        x=x,
+        y=y,
         mode="markers",
         marker=marker | {"line": {"color": "white", "width": 1}},
         name="helper's start",

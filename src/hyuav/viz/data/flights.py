@@ -1,6 +1,9 @@
-"""Flights slot by slot: where the helper was, what each node earned and spent."""
+"""Flights slot by slot: where the helpers were, what each node earned and spent."""
 
+import math
+import re
 from collections.abc import Iterable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from hyuav._support.errors import InputError, rejection
+from hyuav.experiments.evaluation import PER_UE, WAY, helper_columns
 from hyuav.physics.scenario import Point, Scenario
 from hyuav.viz.data.schemes import COMPARED
 
@@ -16,19 +20,21 @@ MODE_ROWS = ("proposed", "optimum")
 
 
 class Flight(NamedTuple):
-    """One flight slot by slot; T slots, U UEs."""
+    """One flight slot by slot; T slots, U UEs, H helpers."""
 
     scheme: str
     path: NDArray[np.float64]
-    """The start and the position in each slot: (T + 1, 2) m."""
+    """The starts and the positions in each slot: (T + 1, H, 2) m."""
     relay: NDArray[np.bool_]
-    """(T,)"""
+    """(T, H)"""
     offloading: NDArray[np.bool_]
     """(T, U)"""
     secrecy_rate: NDArray[np.float64]
     """(T, U) bps/Hz."""
     energy: NDArray[np.float64]
-    """Of the UEs, L and H: (T, U + 2) J."""
+    """Of the UEs, L and the helpers: (T, U + 1 + H) J."""
+    way: NDArray[np.int64]
+    """How a UE sends if it offloads, 0 straight to L and i through helper i: (T, U)."""
     rows: pd.DataFrame
     """As they were read, a row per slot."""
 
@@ -37,9 +43,28 @@ class Flight(NamedTuple):
         """T of the flight."""
         return len(self.relay)
 
-    def helper(self, slot: int) -> Point:
-        """Where the helper is after so many slots, in m."""
-        return float(self.path[slot, 0]), float(self.path[slot, 1])
+    def helpers(self, slot: int) -> list[Point]:
+        """Where the helpers are after so many slots, in m."""
+        return [(float(x), float(y)) for x, y in self.path[slot]]
+
+    @property
+    def off_map(self) -> NDArray[np.bool_]:
+        """Which helpers the map's edge turned back: (T, H)."""
+        return self.rows[helper_columns("off_map", self.relay.shape[1])].to_numpy(bool)
+
+
+def names(letter: str, count: int) -> list[str]:
+    """What helpers, H, or eavesdroppers, E, are called: numbered from 1 where there are several."""
+    return [letter] if count == 1 else [f"{letter} {number}" for number in range(1, count + 1)]
+
+
+def told_modes(relay: NDArray[np.bool_]) -> str:
+    """What each helper does in a slot, (H,): "the helper jams", or "H 1 relays, H 2 jams"."""
+    if len(relay) > 3:  # too many for a title
+        return f"{int(relay.sum())} of {len(relay)} helpers relay"
+    who = ["the helper"] if len(relay) == 1 else names("H", len(relay))
+    verbs = ["relays" if own else "jams" for own in relay]
+    return ", ".join(map(" ".join, zip(who, verbs, strict=True)))
 
 
 def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode: int = 0) -> Flight:
@@ -61,19 +86,73 @@ def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode:
         known = ", ".join(dict.fromkeys(f"{s} {e}" for s, e in pairs)) or "none"
         accepted = f"a scheme and episode of the flights: {known}"
         raise InputError(rejection("flight", f"{scheme} {episode}", accepted))
-    lists = {name: list(rows[name]) for name in ("offloading", "secrecy_rate", "ue_energy")}
-    if any(len(entry) != scenario.num_ues for values in lists.values() for entry in values):
-        accepted = f"lists with an entry for each of the scenario's {scenario.num_ues} UEs"
-        raise InputError(rejection("flights", f"{scheme} {episode}", accepted))
-    others = rows[["edge_energy", "helper_energy"]].to_numpy(float)
+    _require_fit(scenario, rows, f"{scheme} {episode}")
+    columns = partial(helper_columns, num_helpers=scenario.num_helpers)
+    lists = {name: list(rows[name]) for name in PER_UE}
+    relay = rows[columns("relay")].to_numpy(bool)
+    places = np.stack([rows[columns(axis)].to_numpy(float) for axis in "xy"], axis=-1)
+    helper_energy = rows[columns("helper_energy")].to_numpy(float)
+    of_ues = np.array(lists["ue_energy"], dtype=float)
+    offloading = np.array(lists["offloading"], dtype=bool)
     return Flight(
         scheme,
-        np.vstack([scenario.helper_starts[0], rows[["x", "y"]].to_numpy(float)]),
-        rows["relay"].to_numpy(bool),
-        np.array(lists["offloading"], dtype=bool),
+        np.concatenate([np.array([scenario.helper_starts]), places]),
+        relay,
+        offloading,
         np.array(lists["secrecy_rate"], dtype=float),
-        np.hstack([np.array(lists["ue_energy"], dtype=float), others]),
+        np.hstack([of_ues, rows[["edge_energy"]].to_numpy(float), helper_energy]),
+        np.array(list(rows[WAY])) if WAY in rows else relay * np.ones_like(offloading, dtype=int),
         rows,
+    )
+
+
+def _require_fit(scenario: Scenario, rows: pd.DataFrame, flight: str) -> None:
+    """Accept rows that tell of as many UEs and helpers as the scenario has."""
+    if any(len(entry) != scenario.num_ues for name in PER_UE for entry in rows[name]):
+        accepted = f"lists with an entry for each of the scenario's {scenario.num_ues} UEs"
+        raise InputError(rejection("flights", flight, accepted))
+    if (count := num_helpers(rows)) != scenario.num_helpers:
+        accepted = f"those of the scenario's {scenario.num_helpers} helpers, not of {count}"
+        raise InputError(rejection("flights", flight, accepted))
+
+
+def num_helpers(flights: pd.DataFrame) -> int:
+    """H, by the columns of a table of flights."""
+    return max(sum(re.fullmatch("x_[0-9]+", str(name)) is not None for name in flights.columns), 1)
+
+
+Ends = tuple[Point, Point]
+"""Where a link begins and ends, in m."""
+
+
+class Links(NamedTuple):
+    """The links that are alive in a slot."""
+
+    to_legitimate: list[Ends]
+    """From each UE that offloads to L, which hears it on either way."""
+    to_helper: list[Ends]
+    """From each UE that offloads through a helper to that helper."""
+    relaying: list[Ends]
+    """From each helper through which a UE offloads to L."""
+    jamming: list[Ends]
+    """From each helper that jams to the eavesdropper that is nearest to it."""
+
+
+def links(scenario: Scenario, flight: Flight, slot: int) -> Links:
+    """Who sends to whom in a slot, counted from 0."""
+    helpers, legitimate = flight.helpers(slot + 1), scenario.legitimate_position
+    ways = zip(scenario.ue_positions, flight.way[slot], flight.offloading[slot], strict=True)
+    senders = [(ue, int(way)) for ue, way, offloads in ways if offloads]
+    through = sorted({way for _, way in senders if way})
+    jammers = [place for place, relay in zip(helpers, flight.relay[slot], strict=True) if not relay]
+    return Links(
+        [(ue, legitimate) for ue, _ in senders],
+        [(ue, helpers[way - 1]) for ue, way in senders if way],
+        [(helpers[way - 1], legitimate) for way in through],
+        [
+            (place, min(scenario.eavesdropper_positions, key=partial(math.dist, place)))
+            for place in jammers
+        ],
     )
 
 
@@ -94,11 +173,14 @@ def first_flights(
 
 
 def budgets(scenario: Scenario) -> dict[str, float]:
-    """What each node may spend in a slot, in J: "UE 1", ..., "L", "H" as in a flight's energy."""
+    """What each node may spend in a slot, in J: "UE 1", ..., "L", "H" as in a flight's energy.
+
+    Of several helpers: "H 1", "H 2" and so on.
+    """
     return {
         **{f"UE {ue}": scenario.ue_energy_budget for ue in range(1, scenario.num_ues + 1)},
         "L": scenario.edge_energy_budget,
-        "H": scenario.helper_energy_budget,
+        **dict.fromkeys(names("H", scenario.num_helpers), scenario.helper_energy_budget),
     }
 
 
@@ -114,21 +196,25 @@ def flight_tables(
 
     Returns:
         "", the flights: ``scheme``, ``slot`` (0 is the start), ``x`` and ``y`` in m, and whether
-        the helper does ``relay``; "nodes": each ``node`` with its ``x`` and ``y`` in m and the
-        ``coverage`` radius in m of L.
+        the helper does ``relay``; of several helpers a row for each ``helper``, from 1. "nodes":
+        each ``node`` with its ``x`` and ``y`` in m and the ``coverage`` radius in m of L.
     """
     paths = []
     for scheme, flight in first_flights(scenario, flights, schemes).items():
-        columns = {
-            "scheme": scheme,
-            "slot": range(flight.num_slots + 1),
-            "x": flight.path[:, 0],
-            "y": flight.path[:, 1],
-            "relay": [None, *flight.relay.tolist()],
-        }
-        paths.append(pd.DataFrame(columns))
+        for number in range(1, scenario.num_helpers + 1):
+            columns = {
+                "scheme": scheme,
+                "slot": range(flight.num_slots + 1),
+                **({"helper": number} if scenario.num_helpers > 1 else {}),
+                "x": flight.path[:, number - 1, 0],
+                "y": flight.path[:, number - 1, 1],
+                "relay": [None, *flight.relay[:, number - 1].tolist()],
+            }
+            paths.append(pd.DataFrame(columns))
     places = {f"UE {ue}": place for ue, place in enumerate(scenario.ue_positions, start=1)}
-    places |= {"L": scenario.legitimate_position, "E": scenario.eavesdropper_positions[0]}
+    eavesdroppers = names("E", scenario.num_eavesdroppers)
+    places |= {"L": scenario.legitimate_position}
+    places |= dict(zip(eavesdroppers, scenario.eavesdropper_positions, strict=True))
     nodes = pd.DataFrame([(name, *place) for name, place in places.items()])
     nodes.columns = pd.Index(["node", "x", "y"])
     nodes["coverage"] = [scenario.coverage_radius if name == "L" else np.nan for name in places]
@@ -143,7 +229,7 @@ def energy_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
         flights: a row per slot, as in :attr:`Evaluation.flights`.
 
     Returns:
-        ``scheme``, ``slot``, ``node`` ("UE 1", ..., "L", "H"), ``energy`` and ``budget`` in J. L
+        ``scheme``, ``slot``, ``node`` (as in :func:`budgets`), ``energy`` and ``budget`` in J. L
         spends in a slot what the tasks taken in the slot before need.
     """
     budget = budgets(scenario)
@@ -167,14 +253,15 @@ def offloading_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
         flights: a row per slot, as in :attr:`Evaluation.flights`.
 
     Returns:
-        ``scheme``, ``slot``, ``relay`` (whether the helper relays), ``ue`` (from 1),
-        ``offloading``, and its ``secrecy_rate`` in bps/Hz.
+        ``scheme``, ``slot``, ``relay`` (whether the helper relays; of several ``relay_1`` and so
+        on), ``ue`` (from 1), ``offloading``, and its ``secrecy_rate`` in bps/Hz.
     """
+    relays = helper_columns("relay", scenario.num_helpers)
     num_ues, tables = scenario.num_ues, []
     for flight in first_flights(scenario, flights, (*COMPARED, *MODE_ROWS)).values():
         columns = {
             **_slots(flight, num_ues),
-            "relay": flight.relay.repeat(num_ues),
+            **dict(zip(relays, flight.relay.repeat(num_ues, axis=0).T, strict=True)),
             "ue": np.tile(np.arange(1, num_ues + 1), flight.num_slots),
             "offloading": flight.offloading.flatten(),
             "secrecy_rate": flight.secrecy_rate.flatten(),

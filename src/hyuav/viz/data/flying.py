@@ -23,8 +23,8 @@ from hyuav.references.flight import FlightPolicy
 from hyuav.references.optimum import RESOLUTION, Optimum, solve_optimum
 from hyuav.viz.data.index import RunIndex, Stamp
 
-MOST_SLOTS, MOST_UES = 500, 200
-"""Of a scenario that is flown while a person waits."""
+MOST_SLOTS, MOST_UES, MOST_HELPERS = 500, 200, 3
+"""Of a scenario that is flown while a person waits; helpers, where the optimum is sought."""
 
 QUICK = EvaluationParameters(episodes=100, flights=1)
 """How runs are flown that nobody has evaluated."""
@@ -37,8 +37,8 @@ EPISODES = EvaluationParameters(episodes=200, flights=3)
 COARSE_DRAWS, FINE_DRAWS = 64, 256
 """Of the fading and the tasks, from which the optimum is found."""
 
-_COARSE_SPACINGS, _MOST_SPACINGS = 50, 400
-"""Of the grid on each side of the map."""
+_COARSE_SPACINGS, _COARSE_OF_SEVERAL, _MOST_SPACINGS = 50, 20, 400
+"""Of the grid on each side of the map, for one helper and for several."""
 
 
 @dataclass(frozen=True)
@@ -78,18 +78,24 @@ def resolution(scenario: Scenario, *, fine: bool) -> float:
         InputError: the helper is too slow, or the scenario too large, to be solved meanwhile.
     """
     _require_size(scenario)
+    if scenario.num_helpers > MOST_HELPERS:
+        accepted = f"at most {MOST_HELPERS} for the optimum on this page"
+        raise InputError(rejection("number of helpers", scenario.num_helpers, accepted))
     step = scenario.max_speed * scenario.slot_duration
     if step * _MOST_SPACINGS < scenario.map_side:
         least = scenario.map_side / (_MOST_SPACINGS * scenario.slot_duration)
         accepted = f"at least {least:.4g} m/s for the optimum on this page"
         raise InputError(rejection("max_speed", scenario.max_speed, accepted))
-    coarse = step / math.ceil(step * _COARSE_SPACINGS / scenario.map_side)
+    spacings = _COARSE_SPACINGS if scenario.num_helpers == 1 else _COARSE_OF_SEVERAL
+    coarse = step / math.ceil(step * spacings / scenario.map_side)
     return min(RESOLUTION * scenario.map_side / 200, coarse) if fine else coarse
 
 
 @lru_cache(maxsize=128)
 def optimum(scenario: Scenario, rule: str, *, fine: bool) -> Optimum:
     """The best flight of a scheme, on the coarse grid or on the evaluation's.
+
+    That of several helpers has its upper bound on the latter.
 
     Args:
         scenario: to fly.
@@ -101,7 +107,14 @@ def optimum(scenario: Scenario, rule: str, *, fine: bool) -> Optimum:
     """
     spacing = resolution(scenario, fine=fine)
     draws = FINE_DRAWS if fine else COARSE_DRAWS
-    found = solve_optimum(scenario, [rule], resolution=spacing, draws=draws, evaluation_draws=2000)
+    found = solve_optimum(
+        scenario,
+        [rule],
+        resolution=spacing,
+        draws=draws,
+        evaluation_draws=2000,
+        certify=fine and scenario.num_helpers > 1,
+    )
     return found[rule]
 
 
@@ -124,7 +137,8 @@ def flown(
     policies: Policies = {OPTIMA[rule]: [FlightPolicy(best.path, scenario, best.share)]}
     if checkpoint is not None:
         policies[LEARNED[rule]] = [_policy(scenario, checkpoint)]
-    return evaluate(scenario, "changed", policies, EPISODES)
+    bounds = {} if best.upper_bound is None else {OPTIMA[rule]: best.upper_bound}
+    return evaluate(scenario, "changed", policies, EPISODES, upper_bounds=bounds)
 
 
 @lru_cache(maxsize=64)

@@ -1,5 +1,6 @@
 """What each helper position of a scenario's map brings."""
 
+import dataclasses
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -40,7 +41,7 @@ class HelperMap(NamedTuple):
 
 
 def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
-    """What each helper position brings in each mode.
+    """What each position of a helper brings in each mode; of several, what one brings alone.
 
     Without fading; where the UEs can fill the edge server, with tasks of mean size.
 
@@ -48,6 +49,7 @@ def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
         scenario: whose map is asked for.
         resolution: of the map in m.
     """
+    scenario = dataclasses.replace(scenario, helper_starts=scenario.helper_starts[:1])
     half = scenario.map_side / 2
     axis = torch.arange(-half, half + resolution / 2, resolution, dtype=torch.float64, device="cpu")
     y, x = torch.meshgrid(axis, axis, indexing="ij")

@@ -13,15 +13,23 @@ from hyuav._support.errors import InputError
 from hyuav._support.files import read_parquet
 from hyuav._support.yaml_files import read_yaml
 from hyuav.envs.rewards import REWARDS, SUM_RATE
-from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
+from hyuav.experiments.evaluation import (
+    EVALUATION_FILE,
+    FLIGHTS_FILE,
+    PER_UE,
+    WAY,
+    helper_columns,
+)
 from hyuav.experiments.schemes import LABELS, OPTIMA
+from hyuav.physics.scenario import Scenario
+from hyuav.viz.data.flights import num_helpers
 
-_PER_UE = {"offloading", "secrecy_rate", "ue_energy"}
 _FLIGHT_COLUMNS = {
-    *("scheme", "episode", "slot", "x", "y", "relay", "off_map", "secrecy_sum_rate"),
-    *("relay_sum_rate", "jamming_sum_rate", "edge_energy", "helper_energy"),
-    *_PER_UE,
+    *("scheme", "episode", "slot", "secrecy_sum_rate"),
+    *("relay_sum_rate", "jamming_sum_rate", "edge_energy"),
+    *PER_UE,
 }
+_OF_HELPERS = "x", "y", "relay", "off_map", "helper_energy"
 _ACCOUNT = {"relay_share", "offloading_share", "off_map", "budget_violations"} | {
     *("ue_energy", "edge_energy", "helper_energy")
 }
@@ -80,7 +88,9 @@ def _is_account(account: dict[str, Any]) -> bool:
         if rate is not None:
             low, high = rate["ci95"]
             needed += [rate["mean"], low, high]
-    optional = [account.get(f"fraction_of_{name}", 0.0) for name in ("optimum", "hybrid_optimum")]
+    fractions = ("optimum", "hybrid_optimum", "upper_bound")
+    optional = [account.get(f"fraction_of_{name}", 0.0) for name in fractions]
+    optional.append(account.get("upper_bound", 0.0))
     return all(
         isinstance(value, int | float) and abs(value) <= sys.float_info.max
         for value in needed + optional
@@ -120,7 +130,7 @@ def read_flights(directory: Path) -> pd.DataFrame:
     if not file.is_file():
         raise InputError(f"{file}: expected {accepted} in Parquet (not a file)")
     table = read_parquet(file, accepted)
-    missing = ", ".join(sorted(_FLIGHT_COLUMNS - set(table.columns)))
+    missing = ", ".join(sorted(_flight_columns(table) - set(table.columns)))
     if missing or table.empty:
         raise InputError(f"{file}: expected {accepted} in Parquet (with {missing or 'rows'})")
     if not _is_flown(table):
@@ -136,21 +146,33 @@ def readable_flights(directory: Path) -> pd.DataFrame | None:
         return None
 
 
+def _flight_columns(table: pd.DataFrame) -> set[str]:
+    """What flights of so many helpers as the table's have in any case."""
+    count = num_helpers(table)
+    of_helpers = {column for name in _OF_HELPERS for column in helper_columns(name, count)}
+    return _FLIGHT_COLUMNS | of_helpers | ({WAY} if count > 1 else set())
+
+
 def _is_flown(table: pd.DataFrame) -> bool:
     """Whether all that is drawn of flights are finite numbers, a list of them for the UEs."""
-    numbers = sorted(_FLIGHT_COLUMNS - _PER_UE - {"scheme"})
+    columns = _flight_columns(table)
+    lists = columns & {*PER_UE, WAY}
+    numbers = sorted(columns - lists - {"scheme"})
     try:
         drawn = [table[numbers].to_numpy(float).ravel()]
-        drawn += [np.asarray(own, dtype=float) for name in _PER_UE for own in table[name]]
+        drawn += [np.asarray(own, dtype=float) for name in lists for own in table[name]]
     except (TypeError, ValueError, OverflowError):
         return False
     return all(own.ndim == 1 and np.isfinite(own).all() for own in drawn)
 
 
-def is_drawable(flights: pd.DataFrame, num_ues: int) -> bool:
-    """Whether flights are of known schemes, some at least, and tell of so many UEs."""
+def is_drawable(flights: pd.DataFrame, scenario: Scenario) -> bool:
+    """Whether flights are of known schemes, some at least, and of as many UEs and helpers."""
     known = [isinstance(scheme, str) and scheme in LABELS for scheme in flights["scheme"]]
-    return any(known) and all(len(own) == num_ues for name in _PER_UE for own in flights[name])
+    count = num_helpers(flights)
+    lists = PER_UE if count == 1 else (*PER_UE, WAY)
+    whole = all(len(own) == scenario.num_ues for name in lists for own in flights[name])
+    return any(known) and whole and count == scenario.num_helpers
 
 
 def readable_table(path: Path, columns: Iterable[str]) -> pd.DataFrame | None:

@@ -60,9 +60,12 @@ class FinishedRun:
             InputError: no scheme was evaluated, the file is damaged, or another scenario's.
         """
         flights = read_flights(self.run.path)
-        if not is_drawable(flights, self.scenario.num_ues):
-            file = self.run.path / FLIGHTS_FILE
-            raise InputError(f"{file}: expected flights over {self.scenario.num_ues} UEs")
+        if not is_drawable(flights, self.scenario):
+            file, scenario = self.run.path / FLIGHTS_FILE, self.scenario
+            accepted = f"flights over {scenario.num_ues} UEs"
+            if scenario.num_helpers > 1:
+                accepted += f" by {scenario.num_helpers} helpers"
+            raise InputError(f"{file}: expected {accepted}")
         return flights
 
     @cached_property

@@ -8,7 +8,7 @@ import pandas as pd
 from hyuav._support.errors import InputError
 from hyuav._support.formatting import percent
 from hyuav.experiments.comparison.statistics import summarize_algorithms, summarize_cells
-from hyuav.experiments.comparison.tables import label, stopped
+from hyuav.experiments.comparison.tables import label, stopped, upper_bounds
 from hyuav.viz.data.comparison import ReadableComparison, TrainedEntry
 from hyuav.viz.data.flying import fly_first_learner
 from hyuav.viz.data.schemes import scheme_label
@@ -53,7 +53,8 @@ def _results(
         yield Section(title, (), [Picture(name, {"": figure})])
     algorithms = summarize_algorithms(results, threshold)
     tables = [algorithms_table(algorithms, threshold), cells_table(cells, threshold)]
-    yield Section("Results", stopped(results), (), tables)
+    notes = [*upper_bounds(results), *stopped(results)]
+    yield Section("Results", notes, (), tables)
 
 
 def _flights(runs: Sequence[TrainedEntry]) -> Section:

@@ -92,11 +92,13 @@ def _add_nodes(figure: go.Figure, scenario: Scenario) -> None:
         y1=bottom + radius,
         line={"color": translucent("#FFFFFF", 0.8), "width": 1, "dash": "dot"},
     )
-    legitimate, eavesdropper = scenario.legitimate_position, scenario.eavesdropper_positions[0]
     for name, places, size, symbol, color in (
         ("UE", scenario.ue_positions, 6, None, "#000000"),
-        (LEGITIMATE_LABEL, [legitimate], 13, "square", LEGITIMATE_COLOR),
-        (EAVESDROPPER_LABEL, [eavesdropper], 13, "triangle-down", EAVESDROPPER_COLOR),
+        (LEGITIMATE_LABEL, [scenario.legitimate_position], 13, "square", LEGITIMATE_COLOR),
+        (
+            *(EAVESDROPPER_LABEL, scenario.eavesdropper_positions),
+            *(13, "triangle-down", EAVESDROPPER_COLOR),
+        ),
     ):
         x, y = zip(*places, strict=True)
         edge = {"color": "white", "width": 1}

@@ -4,7 +4,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.data.flights import Flight, read_flight
+from hyuav.viz.data.flights import Flight, read_flight, told_modes
 from hyuav.viz.data.schemes import scheme_color, scheme_label
 from hyuav.viz.html.player_layout import animation_controls, layouts
 from hyuav.viz.html.player_map import fixed_on_map, moving_on_map
@@ -73,8 +73,9 @@ def _title(flight: Flight, slot: int) -> str:
     """What a person reads of the slot, on two lines."""
     row, relay = flight.rows.iloc[slot], flight.relay[slot]
     count, total = int(flight.offloading[slot].sum()), flight.offloading.shape[1]
-    name, mode = plain(scheme_label(flight.scheme)), "relay" if relay else "jamming"
-    off_map = ", turned back at the edge" if row["off_map"] else ""
+    one = "relay" if relay.all() else "jamming"
+    name, mode = plain(scheme_label(flight.scheme)), one if len(relay) == 1 else told_modes(relay)
+    off_map = ", turned back at the edge" if flight.off_map[slot].any() else ""
     return (
         f"<b>{name}, slot {slot + 1} of {flight.num_slots}: {mode}</b>{off_map}"
         f"<br>{count} of {total} UEs offload, {row['secrecy_sum_rate']:.2f} bps/Hz"

@@ -1,5 +1,6 @@
 """The player's map: the path flown so far, and what the nodes do in a slot."""
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from hyuav.physics.channel import horizontal_distance
 from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import covered
 from hyuav.physics.scenario import Point, Scenario
-from hyuav.viz.data.flights import Flight
+from hyuav.viz.data.flights import Flight, links, names
 from hyuav.viz.html.style import translucent
 
 Trace = dict[str, Any]
@@ -43,7 +44,7 @@ def trace(kind: str, **values: Any) -> Trace:
 
 def fixed_on_map(scenario: Scenario, flight: Flight) -> list[Trace]:
     """What stays from slot to slot."""
-    x, y = flight.path.round(2).T.tolist()
+    x, y = _pieces(flight.path.round(2).swapaxes(0, 1).tolist())
     circle = _circle(scenario.legitimate_position, scenario.coverage_radius)
     return [
         _disk(circle, LEGITIMATE_COLOR, "coverage of L"),
@@ -51,66 +52,63 @@ def fixed_on_map(scenario: Scenario, flight: Flight) -> list[Trace]:
     ]
 
 
+def _pieces(paths: Iterable[Sequence[Sequence[float]]]) -> tuple[list[Any], list[Any]]:
+    """Several paths of (x, y) as one line with gaps; :data:`_NOTHING` where there is none."""
+    points = [point for path in paths for point in ((None, None), *path)][1:]
+    return tuple(map(list, zip(*points, strict=True))) if points else (_NOTHING, _NOTHING)
+
+
 def moving_on_map(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Trace]:
     """What a slot changes, always as many traces in the same order."""
-    x, y = flight.helper(slot + 1)
-    helper = round(x, 2), round(y, 2)
-    relay = bool(flight.relay[slot])
-    near = _circle(helper, scenario.coverage_radius) if relay else (_NOTHING, _NOTHING)
+    helpers = [(round(x, 2), round(y, 2)) for x, y in flight.helpers(slot + 1)]
+    relays = flight.relay[slot]
+    circles = [
+        list(zip(*_circle(helper, scenario.coverage_radius), strict=True))
+        for helper, relay in zip(helpers, relays, strict=True)
+        if relay
+    ]
     return [
-        _disk(near, color, "coverage of H, relaying"),
+        _disk(_pieces(circles), color, "coverage of H, relaying"),
         *_flown(flight, slot, color),
-        *_links(scenario, flight.offloading[slot], helper, relay=relay),
-        *_ues(scenario, flight, slot, helper),
-        _uav(scenario.legitimate_position, LEGITIMATE_LABEL, "square", LEGITIMATE_COLOR),
-        _uav(
-            scenario.eavesdropper_positions[0],
+        *_links(scenario, flight, slot),
+        *_ues(scenario, flight, slot, helpers),
+        _uavs([scenario.legitimate_position], LEGITIMATE_LABEL, "square", LEGITIMATE_COLOR),
+        _uavs(
+            scenario.eavesdropper_positions,
             EAVESDROPPER_LABEL,
             "triangle-down",
             EAVESDROPPER_COLOR,
         ),
-        _uav(helper, HELPER_LABEL, "circle-open", color),
+        _uavs(helpers, HELPER_LABEL, "circle-open", color),
     ]
 
 
 def _flown(flight: Flight, slot: int, color: str) -> list[Trace]:
     """The path up to the slot, as a line for each mode."""
-    coordinates: dict[bool, list[tuple[float | None, float | None]]] = {True: [], False: []}
-    path = flight.path.round(2)
-    for relay, first, last in runs_of_one_mode(flight.relay[: slot + 1]):
-        coordinates[relay] += [(None, None), *map(tuple, path[first : last + 1].tolist())]
+    paths: dict[bool, list[list[list[float]]]] = {True: [], False: []}
+    for helper, path in enumerate(flight.path.round(2).swapaxes(0, 1)):
+        for relay, first, last in runs_of_one_mode(flight.relay[: slot + 1, helper]):
+            paths[relay].append(path[first : last + 1].tolist())
     lines = []
-    for (name, dash), flown in zip(_PATH_DASHES.items(), coordinates.values(), strict=True):
-        x, y = zip(*flown, strict=True) if flown else (_NOTHING, _NOTHING)
+    for (name, dash), flown in zip(_PATH_DASHES.items(), paths.values(), strict=True):
         style = {"color": color, "width": 2.6, "dash": dash}
-        line = _line(list(x), list(y), style, name, legend=True)
+        line = _line(*_pieces(flown), style, name, legend=True)
         lines.append(line | {"mode": "lines+markers", "marker": {"size": 4, "color": color}})
     return lines
 
 
-def _links(
-    scenario: Scenario, offloading: NDArray[np.bool_], helper: Point, *, relay: bool
-) -> list[Trace]:
-    """The links that are alive: a UE's while it offloads, the helper's in its mode."""
-    senders = [ue for ue, sends in zip(scenario.ue_positions, offloading, strict=True) if sends]
-    legitimate, eavesdropper = scenario.legitimate_position, scenario.eavesdropper_positions[0]
-    alive = {
-        "UE → L": [(ue, legitimate) for ue in senders],
-        "UE → H": [(ue, helper) for ue in senders if relay],
-        "H → L, relays": [(helper, legitimate)] if relay and senders else [],
-        "H → E, jams": [] if relay else [(helper, eavesdropper)],
-    }
-    lines = []
-    for name, ends in alive.items():
-        x = [value for first, last in ends for value in (first[0], last[0], None)]
-        y = [value for first, last in ends for value in (first[1], last[1], None)]
-        lines.append(_line(x or _NOTHING, y or _NOTHING, LINKS[name], name, legend=True))
-    return lines
+def _links(scenario: Scenario, flight: Flight, slot: int) -> list[Trace]:
+    """The links that are alive: a UE's while it offloads, a helper's in its mode."""
+    return [
+        _line(*_pieces(ends), style, name, legend=True)
+        for (name, style), ends in zip(LINKS.items(), links(scenario, flight, slot), strict=True)
+    ]
 
 
-def _ues(scenario: Scenario, flight: Flight, slot: int, helper: Point) -> list[Trace]:
+def _ues(scenario: Scenario, flight: Flight, slot: int, helpers: Sequence[Point]) -> list[Trace]:
     """The UEs, filled where they offload."""
-    near_legitimate, near_helper = _coverage(scenario, helper)
+    near_legitimate, near_helpers = _coverage(scenario, helpers)
+    called = names("H", len(helpers))
     points = np.array(scenario.ue_positions)
     texts = np.array(
         [
@@ -118,7 +116,10 @@ def _ues(scenario: Scenario, flight: Flight, slot: int, helper: Point) -> list[T
             f"<br>{flight.secrecy_rate[slot, index]:.3f} bps/Hz, "
             f"{1e3 * flight.energy[slot, index]:.2f} mJ"
             f"<br>{'within' if near_legitimate[index] else 'outside'} the coverage of L, "
-            f"{'within' if near_helper[index] else 'outside'} that of H"
+            + ", ".join(
+                f"{'within' if near else 'outside'} that of {name}"
+                for near, name in zip(near_helpers[index], called, strict=True)
+            )
             for index in range(scenario.num_ues)
         ]
     )
@@ -143,12 +144,15 @@ def _ues(scenario: Scenario, flight: Flight, slot: int, helper: Point) -> list[T
     return traces
 
 
-def _coverage(scenario: Scenario, helper: Point) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which UEs eq. 5 lets jam, and which it lets relay, were the helper there: (U,) each."""
+def _coverage(
+    scenario: Scenario, helpers: Sequence[Point]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which UEs L covers, (U,), and which each helper would: (U, H), as eq. 5 has it."""
     nodes, radius = Nodes.of(scenario, "cpu"), scenario.coverage_radius
     to_legitimate = horizontal_distance(nodes.ue, nodes.legitimate)
-    to_helper = horizontal_distance(nodes.ue, nodes.legitimate.new_tensor(helper))
-    return covered(to_legitimate, radius).numpy(), covered(to_helper, radius).numpy()
+    places = nodes.legitimate.new_tensor(helpers)
+    to_helpers = horizontal_distance(nodes.ue.unsqueeze(1), places)
+    return covered(to_legitimate, radius).numpy(), covered(to_helpers, radius).numpy()
 
 
 def _circle(center: Point, radius: float) -> tuple[list[float], list[float]]:
@@ -175,14 +179,18 @@ def _line(x: Any, y: Any, style: dict[str, Any], name: str, *, legend: bool = Fa
     )
 
 
-def _uav(position: Point, name: str, symbol: str, color: str) -> Trace:
+def _uavs(positions: Sequence[Point], label: str, symbol: str, color: str) -> Trace:
+    """UAVs of one role, numbered where there are several."""
+    x, y = map(list, zip(*positions, strict=True))
+    count = len(positions)
     return trace(
         "scatter",
-        x=[position[0]],
-        y=[position[1]],
-        name=name,
+        x=x,
+        y=y,
+        text=[label if count == 1 else f"{label} {number}" for number in range(1, count + 1)],
+        name=label,
         mode="markers",
         marker={"symbol": symbol, "size": 14, "color": color, "line": {"width": 3, "color": color}},
-        hovertemplate=f"{name}<br>(%{{x:.1f}}, %{{y:.1f}}) m<extra></extra>",
+        hovertemplate="%{text}<br>(%{x:.1f}, %{y:.1f}) m<extra></extra>",
         cliponaxis=False,
     )

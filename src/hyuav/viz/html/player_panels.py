@@ -6,7 +6,7 @@ import numpy as np
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.data.flights import Flight, budgets
+from hyuav.viz.data.flights import Flight, budgets, names
 from hyuav.viz.html.player_map import Trace, trace
 from hyuav.viz.html.style import translucent
 
@@ -56,7 +56,8 @@ def _bars(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Tra
     available = np.array(list(budgets(scenario).values()))
     spent, rates = flight.energy[slot], flight.secrecy_rate[slot].round(4)
     shares = 100 * np.divide(spent, available, out=np.zeros_like(spent), where=available > 0)
-    units = np.array([1e3] * len(ues) + [1.0, 1.0])
+    uavs = ["L", *names("H", scenario.num_helpers)]
+    units = np.array([1e3] * len(ues) + [1.0] * len(uavs))
     told = [
         f"{unit * value:.4g} of {unit * budget:g} {'J' if unit == 1 else 'mJ'}"
         for value, budget, unit in zip(spent, available, units, strict=True)
@@ -81,10 +82,14 @@ def _bars(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Tra
         _panel(
             3,
             "bar",
-            x=[*ues, "L", "H"],
+            x=[*ues, *uavs],
             y=shares.round(2).tolist(),
             name="energy",
-            marker={"color": ["#8A8A8A"] * len(ues) + [LEGITIMATE_COLOR, color]},
+            marker={
+                "color": ["#8A8A8A"] * len(ues)
+                + [LEGITIMATE_COLOR]
+                + [color] * scenario.num_helpers
+            },
             text=energy_texts if labelled else None,
             customdata=told,
             hovertemplate="%{x}: %{customdata}, %{y:.1f} %<extra></extra>",

@@ -8,7 +8,12 @@ from markupsafe import Markup, escape
 
 from hyuav._support.formatting import bounds, or_never, percent
 from hyuav.experiments.comparison.tables import label
-from hyuav.experiments.evaluation_table import earned_title, flight_cells
+from hyuav.experiments.evaluation_table import (
+    earned_title,
+    flight_cells,
+    is_bounded,
+    upper_bounds,
+)
 from hyuav.viz.data.configuration import SYMBOLS, entries
 from hyuav.viz.data.schemes import scheme_color, scheme_label
 
@@ -69,9 +74,13 @@ def scheme_table(summary: Mapping[str, Any]) -> Markup:
         f"T = {summary['num_slots']}: mean of {summary['episodes']} episodes on the same fading, "
         "with the 95 % interval; energies per episode"
     )
+    bounded = is_bounded(summary)
+    if bounded:
+        caption += f"; {upper_bounds(summary)}"
+    hybrid = "of own upper bound" if bounded else "of hybrid optimum"
     headings = (
-        *("Scheme", earned_title(summary), "of own optimum"),
-        "Secrecy sum-rate (bps/Hz)" if "reward" in summary else "of hybrid optimum",
+        *("Scheme", earned_title(summary), f"of own {'lower bound' if bounded else 'optimum'}"),
+        "Secrecy sum-rate (bps/Hz)" if "reward" in summary else hybrid,
         *("Relay slots", "UEs offloading", "Off map", "Energy per UE (mJ)"),
         *("Energy of L (J)", "Energy of H (kJ)", "Budgets exceeded"),
     )

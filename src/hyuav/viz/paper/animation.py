@@ -1,11 +1,11 @@
 """A flight in motion: coverage, links and modes, slot by slot."""
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ from hyuav.envs.rendering import (
     draw_scenario,
 )
 from hyuav.physics.scenario import Point, Scenario
-from hyuav.viz.data.flights import Flight
+from hyuav.viz.data.flights import Flight, links, names, told_modes
 from hyuav.viz.data.schemes import COLORS, scheme_label
 from hyuav.viz.paper.style import MODE_COLORS, STYLE
 
@@ -41,6 +41,10 @@ JAMMING: dict[str, Any] = {
 """The line from the helper to the eavesdropper that it jams."""
 
 
+MIXED = "0.6"
+"""Color of a slot in which some helpers relay and others jam."""
+
+
 def animate_flight(scenario: Scenario, flight: Flight, file: Path) -> None:
     """Write a flight as an animated GIF: who offloads to whom, in which mode, and what it brings.
 
@@ -56,7 +60,7 @@ def animate_flight(scenario: Scenario, flight: Flight, file: Path) -> None:
         figure = Figure(figsize=INCHES)
         over_map = figure.add_axes((0.17, 0.395, 0.79, 0.79 * INCHES[0] / INCHES[1]))
         over_time = figure.add_axes((0.17, 0.21, 0.79, 0.09))
-        _draw_legend(figure)
+        _draw_legend(figure, mixed=scenario.num_helpers > 1)
         writer = PillowWriter(fps=SLOTS_PER_SECOND)
         drawn = Path(elsewhere) / file.name  # Pillow tells the format by the name
         with writer.saving(figure, str(drawn), DPI):
@@ -73,34 +77,42 @@ def _draw_map(axes: Axes, scenario: Scenario, flight: Flight, flown: int) -> Non
     """The flight up to now, with the links of the last of its slots."""
     offloading = flight.offloading[flown - 1] if flown else [False] * scenario.num_ues
     draw_scenario(axes, scenario, offloading)
-    helper, color = flight.helper(flown), COLORS[flight.scheme]
-    draw_coverage(axes, helper, scenario.coverage_radius, color)
-    draw_flight(axes, flight.path[: flown + 1], flight.relay[:flown], color)
+    helpers, color = flight.helpers(flown), COLORS[flight.scheme]
+    for number, helper in enumerate(helpers):
+        path, relay = flight.path[: flown + 1, number], flight.relay[:flown, number]
+        draw_coverage(axes, helper, scenario.coverage_radius, color)
+        draw_flight(axes, path, relay, color)
     ring: Any = {
         "marker": "o",
         "markersize": 10.0,
         "markerfacecolor": "white",
         "markeredgewidth": 1.6,
     }
-    axes.plot(*helper, color=color, clip_on=False, zorder=4.5, **ring)
-    _draw_letters(axes, scenario, helper)
+    x, y = zip(*helpers, strict=True)
+    axes.plot(x, y, linestyle="", color=color, clip_on=False, zorder=4.5, **ring)
+    _draw_letters(axes, scenario, helpers)
     title = f"slot {flown} of {scenario.num_slots}"
     if flown:
-        mode = "relays" if flight.relay[flown - 1] else "jams"
-        axes.set_title(f"{scheme_label(flight.scheme)}, {title}: the helper {mode}")
+        told = told_modes(flight.relay[flown - 1])
+        axes.set_title(f"{scheme_label(flight.scheme)}, {title}: {told}")
         _draw_links(axes, scenario, flight, flown)
     else:
         axes.set_title(f"{title}: start")
 
 
-def _draw_letters(axes: Axes, scenario: Scenario, helper: Point) -> None:
-    """Name the UAVs: the helper within its ring, the others beside their places."""
-    places = {
-        "L": (scenario.legitimate_position, (9, -9)),
-        "E": (scenario.eavesdropper_positions[0], (-10, 7)),
-        "H": (helper, (0, 0)),
-    }
-    for letter, (place, offset) in places.items():
+def _draw_letters(axes: Axes, scenario: Scenario, helpers: Sequence[Point]) -> None:
+    """Name the UAVs: the helpers within their rings, the others beside their places."""
+    eavesdroppers = scenario.eavesdropper_positions
+    in_ring = ["H"] if len(helpers) == 1 else [str(n) for n in range(1, len(helpers) + 1)]
+    letters = [
+        ("L", scenario.legitimate_position, (9, -9)),
+        *(
+            (name, at, (-10, 7))
+            for name, at in zip(names("E", len(eavesdroppers)), eavesdroppers, strict=True)
+        ),
+        *((name, at, (0, 0)) for name, at in zip(in_ring, helpers, strict=True)),
+    ]
+    for letter, place, offset in letters:
         axes.annotate(
             letter,
             place,
@@ -116,26 +128,19 @@ def _draw_letters(axes: Axes, scenario: Scenario, helper: Point) -> None:
 
 
 def _draw_links(axes: Axes, scenario: Scenario, flight: Flight, flown: int) -> None:
-    """From each UE that offloads to L and, in relay mode, by way of the helper; or the jamming."""
-    helper, relays = flight.helper(flown), flight.relay[flown - 1]
-    sending = np.asarray(scenario.ue_positions)[flight.offloading[flown - 1]]
-    style: Any = {"color": LINK_COLOR, "linewidth": 0.7, "zorder": 2.2}
-    receivers = [scenario.legitimate_position, *([helper] if relays else [])]
-    for receiver in receivers:
-        for ue in sending:
-            axes.plot(*zip(ue, receiver, strict=True), **style)
-    if relays and len(sending):
-        ends = (helper, scenario.legitimate_position)
-        axes.plot(*zip(*ends, strict=True), **style | {"linewidth": 1.6})
-    if not relays:
-        ends = (helper, scenario.eavesdropper_positions[0])
-        axes.plot(*zip(*ends, strict=True), **JAMMING, zorder=2.6)
+    """What each UE that offloads sends, what helpers relay, and what they jam."""
+    sent: Any = {"color": LINK_COLOR, "linewidth": 0.7, "zorder": 2.2}
+    styles = (sent, sent, sent | {"linewidth": 1.6}, JAMMING | {"zorder": 2.6})
+    for ends, style in zip(links(scenario, flight, flown - 1), styles, strict=True):
+        for own in ends:
+            axes.plot(*zip(*own, strict=True), **style)
 
 
 def _draw_rates(axes: Axes, flight: Flight, flown: int) -> None:
     """The secrecy sum-rate of each slot up to now."""
     rates = flight.rows["secrecy_sum_rate"].to_numpy(float)
-    colors = [MODE_COLORS["relay" if relay else "jamming"] for relay in flight.relay[:flown]]
+    share = flight.relay[:flown].mean(axis=1)
+    colors = [{0.0: MODE_COLORS["jamming"], 1.0: MODE_COLORS["relay"]}.get(x, MIXED) for x in share]
     axes.bar(range(1, flown + 1), rates[:flown], color=colors, width=0.8)
     highest = max(float(rates.max()), 1.0)
     axes.set(xlim=(0.4, flight.num_slots + 0.6), ylim=(0, 1.05 * highest), xlabel="Slot")
@@ -143,7 +148,7 @@ def _draw_rates(axes: Axes, flight: Flight, flown: int) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(10, integer=True, steps=[1, 2, 5, 10]))
 
 
-def _draw_legend(figure: Figure) -> None:
+def _draw_legend(figure: Figure, *, mixed: bool) -> None:
     ue: Any = {"color": UE_COLOR, "marker": "o", "markersize": 3.5}
     handles = [
         Line2D([], [], **ue, markerfacecolor=UE_COLOR, linestyle="", label="UE offloads"),
@@ -155,4 +160,6 @@ def _draw_legend(figure: Figure) -> None:
             for mode in ("relay", "jamming")
         ),
     ]
+    if mixed:
+        handles.append(Patch(facecolor=MIXED, label="sum-rate, some relay, some jam"))
     figure.legend(handles=handles, loc="lower center", ncols=2, frameon=False, fontsize=6.5)

@@ -5,11 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR, draw_flight, draw_scenario, mode_handles
 from hyuav.experiments.schemes import LABELS
@@ -111,19 +114,42 @@ def save_flight_map(
 
 def _draw_optimum(axes: Axes, flown: Mapping[str, Flight], optimum: str) -> None:
     if optimum in flown:
-        axes.plot(
-            *flown[optimum].path.T,
-            color=OPTIMUM_COLOR,
-            linewidth=OPTIMUM_WIDTH,
-            zorder=1.5,
-            label=LABELS["optimum"],
-        )
+        for number, path in enumerate(flown[optimum].path.swapaxes(0, 1)):
+            axes.plot(
+                *path.T,
+                color=OPTIMUM_COLOR,
+                linewidth=OPTIMUM_WIDTH,
+                zorder=1.5,
+                label=None if number else LABELS["optimum"],
+            )
 
 
 def _draw_scheme(axes: Axes, flown: Mapping[str, Flight], scheme: str) -> None:
     if scheme in flown:
-        flight = flown[scheme]
-        draw_flight(axes, flight.path, flight.relay, COLORS[scheme], LABELS[scheme])
+        flight, color = flown[scheme], COLORS[scheme]
+        for helper in range(flight.relay.shape[1]):
+            label = None if helper else LABELS[scheme]
+            path = flight.path[:, helper]
+            draw_flight(axes, path, flight.relay[:, helper], color, label)
+            if flight.relay.shape[1] > 1:
+                _number(axes, helper + 1, path[-1], color)
+
+
+def _number(axes: Axes, number: int, end: NDArray[np.float64], color: str) -> None:
+    """Tell which of several helpers ends there, beside the star, towards the middle of the map."""
+    axes.annotate(
+        str(number),
+        end,
+        np.where(end > 0, -7.0, 7.0),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        color=color,
+        weight="bold",
+        fontsize=7,
+        path_effects=[withStroke(linewidth=1.5, foreground="white")],
+        zorder=5,
+    )
 
 
 def _coverage_handle() -> Patch:

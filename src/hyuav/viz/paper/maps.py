@@ -39,9 +39,9 @@ def sum_rate_maps(scenario: Scenario, table: pd.DataFrame) -> Figure:
             image = axes.imshow(
                 rates, origin="lower", extent=extent, cmap="viridis", vmin=0.0, vmax=better.max()
             )
-        figure.colorbar(
-            image, ax=panels, location="top", label="Secrecy sum-rate (bps/Hz)", aspect=35
-        )
+        alone = " of one helper alone" if scenario.num_helpers > 1 else ""
+        label = f"Secrecy sum-rate{alone} (bps/Hz)"
+        figure.colorbar(image, ax=panels, location="top", label=label, aspect=35)
         colors = ListedColormap(list(MODE_COLORS.values()))
         panels[3].imshow(chosen, origin="lower", extent=extent, cmap=colors, vmin=-0.5, vmax=2.5)
         nodes, _ = panels[0].get_legend_handles_labels()

@@ -30,7 +30,7 @@ NOTHING = "0.88"
 
 
 def energy_by_slot(table: pd.DataFrame) -> Figure:
-    """The energy of every UE under one scheme, and of L and of the helper under all.
+    """The energy of every UE under one scheme, and of L and of each helper under all.
 
     Args:
         table: of :func:`.energy_table`. The UEs are those of its first scheme.
@@ -39,13 +39,18 @@ def energy_by_slot(table: pd.DataFrame) -> Figure:
     nodes = {str(name): rows for name, rows in table.groupby("node", sort=False)}
     ues = [rows[rows["scheme"] == scheme] for name, rows in nodes.items() if name[:2] == "UE"]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(COLUMN_WIDTH, 5.0), layout="constrained")
-        of_ues, of_edge, of_helper = figure.subplots(3, sharex=True, height_ratios=(1.5, 1, 1))
+        below = [name for name in nodes if name[:2] != "UE"]  # L and the helpers
+        inches = COLUMN_WIDTH, 2.8 + 1.1 * len(below)
+        figure = Figure(figsize=inches, layout="constrained")
+        of_ues, *panels = figure.subplots(
+            1 + len(below), sharex=True, height_ratios=(1.5, *[1] * len(below))
+        )
         budget = 1e3 * ues[0]["budget"].iloc[0]
         image = _by_ue(of_ues, [1e3 * rows["energy"] for rows in ues], budget)
         label = f"Energy of each UE, {scheme_label(scheme)} (mJ; budget {budget:g} mJ)"
         figure.colorbar(image, ax=of_ues, location="top", label=label, aspect=35)
-        for axes, node, scale, unit in ((of_edge, "L", 1.0, "J"), (of_helper, "H", 1e-3, "kJ")):
+        for axes, node in zip(panels, below, strict=True):
+            scale, unit = (1.0, "J") if node == "L" else (1e-3, "kJ")
             for name, rows in nodes[node].groupby("scheme", sort=False):
                 axes.plot(rows["slot"], scale * rows["energy"], **_look(str(name)))
             limit = scale * nodes[node]["budget"].iloc[0]
@@ -53,8 +58,8 @@ def energy_by_slot(table: pd.DataFrame) -> Figure:
             axes.set_ylabel(f"Energy of {node} ({unit})")
             axes.grid()
             axes.set_axisbelow(True)
-        of_helper.set_xlabel("Slot")
-        handles, _ = of_edge.get_legend_handles_labels()
+        panels[-1].set_xlabel("Slot")
+        handles, _ = panels[0].get_legend_handles_labels()
         budget_line = Line2D([], [], color="0.3", linewidth=0.9, linestyle="dashdot")
         budget_line.set_label("budget per slot")
         legend_below(figure, [*handles, budget_line], 3)
@@ -70,16 +75,23 @@ def offloading_by_slot(table: pd.DataFrame) -> Figure:
     schemes = {str(name): rows for name, rows in table.groupby("scheme", sort=False)}
     first, own = next(iter(schemes.items()))
     rows = [name for name in MODE_ROWS if name in schemes] or [first]
-    modes = [schemes[name].groupby("slot")["relay"].first() + 1 for name in rows]
+    relays = [column for column in table.columns if column.startswith("relay")]
+    modes = {
+        scheme_label(name) + column.replace("relay_", ", H ").removeprefix("relay"): (
+            schemes[name].groupby("slot")[column].first() + 1
+        )
+        for name in rows
+        for column in relays
+    }
     rates = [ue["secrecy_rate"].where(ue["offloading"]) for _, ue in own.groupby("ue")]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(COLUMN_WIDTH, 4.6), layout="constrained")
         of_modes, of_ues, of_counts = figure.subplots(
-            3, sharex=True, height_ratios=(0.16 * len(rows), 1.6, 1.1)
+            3, sharex=True, height_ratios=(0.16 * len(modes), 1.6, 1.1)
         )
         colors = ListedColormap(list(MODE_COLORS.values()))
-        _cells(of_modes, modes, colors, -0.5, 2.5)
-        of_modes.set_yticks(range(1, len(rows) + 1), [scheme_label(name) for name in rows])
+        _cells(of_modes, [*modes.values()], colors, -0.5, 2.5)
+        of_modes.set_yticks(range(1, len(modes) + 1), modes)
         image = _by_ue(of_ues, rates, max(own["secrecy_rate"].max(), 0.1))
         label = f"Secrecy rate of each UE, {scheme_label(first)} (bps/Hz)"
         figure.colorbar(image, ax=of_ues, location="top", label=label, aspect=35)
