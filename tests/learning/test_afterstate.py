@@ -50,6 +50,37 @@ def test_it_is_what_the_environment_brings(
         assert features[0, -1] == state["observation"][0, -1]
 
 
+@pytest.mark.parametrize("power_control", [False, True])
+def test_it_is_what_the_environment_brings_several_helpers(power_control: bool) -> None:
+    starts = ((-60.0, -60.0), (70.0, 97.0), (0.0, 30.0))
+    scenario = dataclasses.replace(
+        *(SCENARIO,), helper_starts=starts, power_control=power_control, speed_limit="disc"
+    )
+    env = make_env(scenario, "hybrid", (50,), seed=0, clock=True)
+    state = env.rand_action(env.reset())
+    afterstate = Afterstate(scenario, 0.02, clock=True, geofence=False)
+    features = afterstate(state["observation"], state["action"])
+    after = env.step(state)["next"]
+    assert features.shape == (50, afterstate.size)
+    assert 0 < after["off_map"].sum() < 50
+    covering = after["distances"][..., :10] < scenario.coverage_radius
+    assert torch.equal(afterstate.coverage(features) > 0.5, covering.flatten(-2))
+    shown = features.split((6, 36, 30, 3, 3 * power_control, 1), dim=-1)
+    expected = [
+        after["position"].flatten(-2) / 100.0,
+        after["distances"].flatten(-2) / 100.0 - 1.0,
+        shown[2],
+        after["off_map"] * 2.0 - 1.0,
+        state["action"][:, 2::3] if power_control else shown[4],
+        state["observation"][:, -1:],
+    ]
+    for own, brought in zip(shown, expected, strict=True):
+        torch.testing.assert_close(own, brought, rtol=0.0, atol=1e-4)
+    place = afterstate.layout.place(env.step(state))
+    known = afterstate.at(place, state["observation"][:, -1:])
+    torch.testing.assert_close(known[:, :72], features[:, :72], rtol=0.0, atol=1e-4)
+
+
 def test_a_gradient_leads_into_the_coverage() -> None:
     position = torch.tensor([26.0 + 46.0, -16.0])  # one metre outside that of a UE
     action = torch.zeros(1, 2, requires_grad=True)

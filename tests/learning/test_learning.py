@@ -65,6 +65,19 @@ def test_learning_curves_do_not_depend_on_how_fast_they_are_made(name: str) -> N
 
 
 @pytest.mark.slow
+def test_every_seed_of_the_robust_variant_learns_the_power() -> None:
+    """The best power is some 30 dB below the nominal one, which earns less than none at all."""
+    torch.set_num_threads(1)
+    preset = Scenario.preset("two_clusters")
+    scenario = dataclasses.replace(preset, num_slots=10, fading=False, power_control=True)
+    parameters = TrainingParameters(num_episodes=200, evaluation_every=5, evaluation_episodes=1)
+    training = Training(scenario, range(3), ALGORITHMS["ddpg_robust"](), parameters)
+    list(training.episodes())
+    optimum = solve_optimum(scenario, ["hybrid"], resolution=5.0, power_step=3.0)["hybrid"].value
+    assert (training.best_evaluation > 0.95 * optimum).all()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("num_slots", [10, 20])
 def test_every_seed_of_the_robust_variant_finds_the_far_region(num_slots: int) -> None:
     """Jamming pays only beyond the eavesdropper, five slots without a reward away."""

@@ -27,6 +27,7 @@ class ObservationLayout:
         self._clock = int(clock)
         self.num_helpers = scenario.num_helpers
         """H."""
+        self.power_control = scenario.power_control
         self.size_of_each_action = scenario.action_size
         """Numbers by which an action steers one helper."""
         self.action_size = self.num_helpers * self.size_of_each_action
@@ -64,6 +65,22 @@ class ObservationLayout:
             observation: (..., size).
         """
         return observation[..., : 2 * self.num_helpers]
+
+    def place(self, slots: TensorDictBase) -> Tensor:
+        """Where slots (...) were spent and at which power: (..., actions).
+
+        It is laid out as an action is: the position of each helper, in units of half the map's
+        side, followed by its power in [-1, 1] where that is controlled.
+
+        Args:
+            slots: with ``action`` and the ``observation`` that follows it.
+        """
+        position = self.position(slots["next", "observation"])
+        if not self.power_control:
+            return position
+        power = slots["action"].unflatten(-1, (self.num_helpers, -1))[..., 2:]
+        position = position.unflatten(-1, (self.num_helpers, 2))
+        return torch.cat([position, power], dim=-1).flatten(-2)
 
     def clock(self, observation: Tensor) -> Tensor:
         """The slots flown, from -1 (none) to 1 (all): (..., 1).

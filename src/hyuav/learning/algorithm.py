@@ -173,7 +173,8 @@ class AlgorithmParameters(Parameters, ABC):
             layout = ObservationLayout(scenario, clock=self.clock)
             inputs, outputs = layout.size + layout.action_size, 1
         else:
-            inputs, outputs = afterstate.size, 1 + afterstate.num_ues
+            inputs = afterstate.size
+            outputs = 1 + scenario.num_helpers * scenario.num_ues
         network = LearnerMLP(
             learners,
             inputs,
@@ -254,8 +255,8 @@ class Guidance(nn.Module):
         """
         return torch.zeros_like(slot["next", "reward"])
 
-    def end_evaluation(self, positions: Tensor) -> None:
-        """Take note of where the actors fly: (T, N, 2), in units of half the map's side."""
+    def end_evaluation(self, trajectory: Tensor) -> None:
+        """Take note of where the actors fly and at which power: (T, N, actions)."""
 
 
 @dataclass(frozen=True)

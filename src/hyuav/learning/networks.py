@@ -120,13 +120,13 @@ class ScaledTanh(nn.Module):
 class AfterstateCritic(nn.Module):
     """Q(s, a) by what (s, a) leads to.
 
-    It is a sum, as the secrecy sum-rate is: of a part for each UE, which counts as far as the
-    helper covers it, and of one that always counts. So it need not learn how a UE's part ends at
-    the edge of its coverage.
+    It is a sum, as the secrecy sum-rate is: of a part for each UE and helper, which counts as far
+    as the helper covers it, and of one that always counts. So it need not learn how a UE's part
+    ends at the edge of its coverage.
 
     Args:
         afterstate: of the scenario.
-        network: maps its features to the 1 + U parts.
+        network: maps its features to the 1 + H U parts.
     """
 
     def __init__(self, afterstate: Afterstate, network: LearnerMLP) -> None:
@@ -134,7 +134,7 @@ class AfterstateCritic(nn.Module):
         self.afterstate, self.network = afterstate, network
 
     def forward(self, observation: Tensor, action: Tensor) -> Tensor:
-        """Map observations (N, ..., observed) and actions (N, ..., 2) to values (N, ..., 1)."""
+        """Map observations (N, ..., observed) and actions to values (N, ..., 1)."""
         features = self.afterstate(observation, action)
         always, of_each_ue = self.network(features).tensor_split([1], dim=-1)
         covered = self.afterstate.coverage(features)

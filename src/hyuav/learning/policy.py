@@ -50,14 +50,14 @@ def fly_noise_free(
         reward_scale: of the rewards that the learners store, against bps/Hz.
 
     Returns:
-        what they earn, and where they flew in the first of the episodes, (T, N, 2), in units of
-        half the map's side.
+        what they earn, and where they flew and at which power in the first of the episodes,
+        (T, N, actions), as :meth:`ObservationLayout.place` has it.
     """
     scenario, learners = env.base_env.scenario, env.batch_size[0]
     layout = ObservationLayout(scenario, clock=False)  # places stand first, clock or not
     off_map, control_term, told = torch.zeros(3, learners, dtype=torch.float32, device=env.device)
     is_told = env.base_env.reward != DEFAULT
-    state, positions = env.reset(), []
+    state, places = env.reset(), []
     for _ in range(scenario.num_slots):
         slot = env.step(algorithm.actor(state))
         control_term += algorithm.guide.control_term(slot).mean(dim=(1, 2))
@@ -65,11 +65,11 @@ def fly_noise_free(
         off_map += state["off_map"].sum(dim=-1).float().mean(dim=-1)
         if is_told:
             told += state[SUM_RATE].squeeze(-1).mean(dim=-1)
-        positions.append(layout.position(state["observation"])[:, 0])
+        places.append(layout.place(slot)[:, 0])
     reward: Tensor = state["episode_reward"].squeeze(-1).mean(dim=-1)
     sum_rate = told if is_told else reward + scenario.off_map_penalty * off_map
     earned = NoiseFreeReturn(reward - control_term / reward_scale, sum_rate)
-    return earned, torch.stack(positions)
+    return earned, torch.stack(places)
 
 
 class Policy(TensorDictModuleBase):

@@ -263,12 +263,12 @@ class Cohort:
             seed: of the fading.
             noted: whether a guide takes note of where the actors fly.
         """
-        earned, positions = self.evaluate(episodes, seed)
+        earned, trajectory = self.evaluate(episodes, seed)
         better = (earned.reward > self.best_evaluation) & (self.stopped == 0)
         self.best_evaluation = torch.where(better, earned.reward, self.best_evaluation)
         replace_learners(self.best_weights, copy_weights(self.algorithm.loss), better)
         if noted:
-            self.algorithm.guide.end_evaluation(positions)
+            self.algorithm.guide.end_evaluation(trajectory)
         return earned
 
     def state_dict(self) -> dict[str, Any]:

@@ -99,6 +99,20 @@ def test_the_best_flights_are_joined_at_once_or_as_soon_as_possible() -> None:
     assert torch.equal(flights.demonstrate(observation)[..., 0], torch.ones(2, 6))
 
 
+def test_the_powers_of_the_best_flight_are_taken_where_it_is_joined_and_where_it_is_not() -> None:
+    starts = ((0.0, 0.0), (-60.0, -60.0))
+    scenario = dataclasses.replace(SCENARIO, power_control=True, helper_starts=starts)
+    flights = Demonstrations(1, scenario, 0.005)
+    place = torch.tensor([0.1, 0.0, -0.7, -0.6, -0.5, 0.4])
+    flights.keep(torch.zeros(6, 1, 6), place.expand(6, 1, 6), torch.zeros(1))
+    observation = torch.zeros(1, 1, 31)
+    observation[0, 0, :4] = torch.tensor([0.0, 0.0, -0.6, -0.6])
+    joined = torch.tensor([[[0.5, 0.0, -0.7, 0.0, 0.5, 0.4]]])
+    torch.testing.assert_close(flights.demonstrate(observation), joined)
+    hovered = torch.tensor([[[0.0, 0.0, -0.7, 0.0, 0.0, 0.4]]])
+    torch.testing.assert_close(flights.hover(observation), hovered)
+
+
 def test_the_trajectory_of_the_best_flight_is_kept_with_its_actions() -> None:
     trained = cohort(repeat_every=3)
     for _ in range(4):

@@ -72,6 +72,40 @@ def test_of_the_imagined_ones_the_best_is_kept_and_that_of_the_best_guess_planne
     torch.testing.assert_close(flights.best_return, flights.trajectory[..., 0].sum(dim=0))
 
 
+def test_of_the_powers_that_are_tried_the_best_is_kept_and_that_of_the_best_guess_planned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With two helpers in turn, from episode to episode."""
+
+    def at_a_power(_: RewardModel, slots: Tensor) -> Tensor:
+        """Expect most of -12 dB and -48 dB, and guess 24 dB more and 24 dB less."""
+        best = torch.tensor([[0.6, -0.6], [-0.2, 0.2]], device=slots.device)
+        return -(slots.unsqueeze(-2)[..., 2::3] - best).square().sum(dim=-1)
+
+    monkeypatch.setattr(RewardModel, "judge", lambda m, t: at_a_power(m, t).sum(dim=0).unbind(-1))
+
+    def choose(model: RewardModel, candidates: Tensor) -> list[tuple[Tensor, Tensor]]:
+        values, index = at_a_power(model, candidates).max(dim=-2)
+        return [*zip(values.sum(dim=0).unbind(-1), index.unbind(-1), strict=True)]
+
+    monkeypatch.setattr(RewardModel, "choose", choose)
+    monkeypatch.setattr(RewardModel, "update", lambda *_: None)
+    starts = ((-60.0, -60.0), (60.0, -60.0))
+    scenario = dataclasses.replace(SCENARIO, helper_starts=starts, power_control=True)
+    env = make_env(scenario, ["hybrid"] * 2, (2,), seed=[1, 2], clock=True)
+    planning, action = Planner(GUIDE, RobustDDPG(guide=GUIDE), env, [1, 2]), torch.zeros(2, 6)
+    slots = [env.step(env.reset().set("action", action)) for _ in range(6)]
+    flown = torch.stack(slots).select("action", ("next", "observation"), ("next", "reward"))
+    for episode in range(4, 16):
+        planning.end_episode(episode, flown, flown)
+    flights = planning.flights
+    assert torch.equal(flights.trajectory[..., 2::3], flights.actions[..., 2::3])
+    error = (flights.actions[..., 2::3] - torch.tensor([0.6, -0.6])).abs()
+    assert error.max() < 0.06
+    error = (flights.planned_actions[..., 2::3] - torch.tensor([-0.2, 0.2])).abs()
+    assert error.max() < 0.3
+
+
 @pytest.mark.usefixtures("updates")
 def test_nothing_is_imagined_during_the_warm_up() -> None:
     planning = planner(imagined=30)

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from hyuav import Guide, Scenario, make_env
+from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.guide.demonstrations import Demonstrations
 from hyuav.learning.guide.proposals import TrajectoryProposals
 from hyuav.physics.slot import Physics
@@ -29,7 +30,9 @@ SMALL = {
 def flights(scenario: Scenario) -> Demonstrations:
     """The best hovers at the start, the one that is planned flies along x."""
     known = Demonstrations(2, scenario, 0.005)
-    start = torch.tensor(scenario.helper_starts[0]) / (scenario.map_side / 2)
+    places = torch.tensor(scenario.helper_starts) / (scenario.map_side / 2)
+    powers = torch.full((scenario.num_helpers, scenario.action_size - 2), 0.5)
+    start = torch.cat([places, powers], dim=-1).flatten()
     known.trajectory.copy_(start.expand_as(known.trajectory))
     reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
     known.planned_trajectory.copy_(known.trajectory)
@@ -43,26 +46,32 @@ def proposing(imagined: int, scenario: Scenario = SCENARIO) -> TrajectoryProposa
     return TrajectoryProposals(Guide(imagined_flights=imagined), system, SCHEMES)
 
 
-def normals(imagined: int) -> torch.Tensor:
-    return torch.randn(2, imagined, 5, generator=torch.Generator().manual_seed(0))
+def normals(imagined: int, num_helpers: int = 1) -> torch.Tensor:
+    generator = torch.Generator().manual_seed(0)
+    return torch.randn(2, imagined, 3 + 2 * num_helpers, generator=generator)
 
 
-@pytest.mark.parametrize("changes", [{}, {"speed_limit": "disc"}, DEAR, SMALL])
+SEVERAL = {"helper_starts": ((-60.0, -60.0), (60.0, -60.0)), "power_control": True, **DEAR}
+
+
+@pytest.mark.parametrize("changes", [{}, {"speed_limit": "disc"}, DEAR, SMALL, SEVERAL])
 @pytest.mark.parametrize("geofence", [False, True])
 def test_the_environment_flies_what_was_imagined(changes: dict[str, Any], geofence: bool) -> None:
     scenario = dataclasses.replace(SCENARIO, **changes)
     proposals = proposing(35, scenario)
-    actions, trajectory = proposals.fly(3, flights(scenario), normals(35))
-    assert actions.shape == trajectory.shape == (6, 2, 70, 2)
+    size = scenario.num_helpers * scenario.action_size
+    actions, trajectory = proposals.fly(3, flights(scenario), normals(35, scenario.num_helpers))
+    assert actions.shape == trajectory.shape == (6, 2, 70, size)
     env = make_env(scenario, SCHEMES, (2, 70), seed=0, geofence=geofence)
     state, half_side = env.reset(), scenario.map_side / 2
     for action, place in zip(actions, trajectory, strict=True):
-        state = env.step_mdp(env.step(state.set("action", action)))
+        slot = env.step(state.set("action", action))
+        state = env.step_mdp(slot)
         assert not state["off_map"].any()
-        flown = state["position"].squeeze(-2)
-        torch.testing.assert_close(flown, place * half_side, atol=1e-3, rtol=0.0)
+        flown = ObservationLayout(scenario, clock=False).place(slot)
+        torch.testing.assert_close(flown, place, atol=1e-3 / half_side, rtol=0.0)
     straight = trajectory[:, :, :35]
-    assert torch.equal(straight[:, 0], straight[:, 1]) == (changes != DEAR)
+    assert torch.equal(straight[:, 0], straight[:, 1]) == ("jamming_power" not in changes)
 
 
 def test_other_flights_are_imagined_in_every_episode_and_they_cover_what_can_be_reached() -> None:

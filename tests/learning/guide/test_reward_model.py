@@ -82,6 +82,36 @@ def test_a_flight_is_worth_the_sum_of_its_slots() -> None:
     torch.testing.assert_close(expected, truth, atol=0.4, rtol=0.0)
 
 
+def test_of_candidates_that_of_which_most_is_expected_is_chosen_in_each_slot() -> None:
+    regression = reward_model(2)
+    normals = torch.randn(2, regression.size, generator=torch.Generator().manual_seed(4))
+    regression.update(memory(around((0.0, 0.0), 0.3, 2)), normals)
+    candidates = torch.rand(5, 2, 3, 4, 2, generator=torch.Generator().manual_seed(5)) - 0.5
+    for number, (value, chosen) in enumerate(regression.choose(candidates)):
+        flight = torch.take_along_dim(candidates, chosen[..., None, None], dim=3).squeeze(3)
+        worth = regression.judge(flight)[number]
+        torch.testing.assert_close(value, worth)
+        for other in range(4):
+            for slot in range(5):
+                changed = flight.clone()
+                changed[slot] = candidates[slot, :, :, other]
+                assert (worth >= regression.judge(changed)[number] - 1e-4).all()
+
+
+@pytest.mark.parametrize(("slope", "best"), [(-2.0, 0), (2.0, 2)])
+def test_what_the_power_adds_is_learned(slope: float, best: int) -> None:
+    regression = reward_model(scenario=dataclasses.replace(SCENARIO, power_control=True))
+    places = around((0.0, 0.0), 0.3)
+    power = torch.linspace(-1.0, 1.0, len(places)).reshape(-1, 1, 1)
+    slots = memory(places)
+    slots["action"] = torch.cat([torch.zeros_like(places), power], dim=-1)
+    slots["next", "reward"] = 0.05 * (earned(places) + slope * power)
+    regression.update(slots, torch.zeros(1, regression.size))
+    place = torch.tensor([-0.3, 0.1]).expand(3, 2)
+    tried = torch.cat([place, torch.tensor([[-0.8], [0.0], [0.8]])], dim=-1).reshape(1, 1, 1, 3, 3)
+    assert regression.choose(tried)[0][1].item() == best
+
+
 def test_guesses_differ_where_little_is_known() -> None:
     regression = reward_model()
     known, unknown = (-0.3, 0.1), (0.9, -0.9)

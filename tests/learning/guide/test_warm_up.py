@@ -1,11 +1,13 @@
 """Flights to places all over the map."""
 
+import dataclasses
+
 import pytest
 import torch
 from tensordict import TensorDict
 
 from hyuav import Guide, Scenario
-from hyuav.learning.guide.warm_up import WarmUp
+from hyuav.learning.guide.warm_up import WarmUp, evenly
 
 SCENARIO = Scenario.preset("two_clusters")
 
@@ -55,6 +57,41 @@ def test_every_warm_up_covers_the_map_and_its_corners() -> None:
     assert nearest.max() < 30.0
     corners = (spots.abs() == 100.0).all(dim=-1)
     assert nearest[:, corners].median() < 10.0
+
+
+def test_each_helper_has_destinations_of_its_own_and_powers_are_drawn_evenly() -> None:
+    torch.manual_seed(0)
+    starts = ((-60.0, -60.0), (60.0, -60.0))
+    scenario = dataclasses.replace(SCENARIO, helper_starts=starts, power_control=True)
+    warm_up, ends, powers = WarmUp(3, Guide(), scenario), [], []
+    for _ in range(60):
+        position = torch.tensor(starts).expand(3, 2, 2)
+        for count in range(12):
+            seen = TensorDict(
+                action=torch.zeros(3, 6),
+                step_count=torch.full((3, 1), count),
+                position=position,
+                batch_size=[3],
+            )
+            velocity, power = warm_up(seen)["action"].unflatten(-1, (2, 3)).tensor_split([2], -1)
+            position = (position + 20.0 * velocity).clamp(-100.0, 100.0)
+            powers.append(power)
+        ends.append(position)
+    coordinates = torch.stack(ends).flatten(0, 1).flatten(1)
+    assert (torch.corrcoef(coordinates.T) - torch.eye(4)).abs().max() < 0.3
+    drawn = torch.stack(powers).flatten()
+    assert torch.histc(drawn, 10, -1.0, 1.0).std() < 0.1 * len(drawn) / 10
+    assert abs(drawn.diff().sign().mean()) < 0.1  # anew in each slot
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 4])
+def test_multiples_fill_the_unit_cube_evenly(dimensions: int) -> None:
+    numbers = torch.tensor(evenly(dimensions), dtype=torch.float64)
+    points = torch.frac(torch.arange(4096).unsqueeze(-1) * numbers)
+    cells = (points * 4).long() @ (4 ** torch.arange(dimensions))
+    counts = torch.bincount(cells, minlength=4**dimensions)
+    assert counts.min() > 0.5 * counts.float().mean()
+    assert counts.max() < 1.5 * counts.float().mean()
 
 
 def test_warm_ups_go_in_orders_of_their_own() -> None:

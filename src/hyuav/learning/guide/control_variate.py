@@ -42,7 +42,7 @@ class ControlVariate(nn.Module):
         reward_scale: float,
     ) -> None:
         super().__init__()
-        self._scale = reward_scale
+        self._scale, self.scenario = reward_scale, scenario
         self.afterstate = afterstate
         self.layout = afterstate.layout
         outputs = 1 + LinkRow.of(scenario).size
@@ -52,7 +52,8 @@ class ControlVariate(nn.Module):
         """What is to be expected of slots (N, ..., 1), and what each power adds (N, ..., links).
 
         Args:
-            place: (N, ..., 2), where the helper is at their end, in units of half the map's side.
+            place: (N, ..., actions), where the helpers are at their end and at which power, as
+                :meth:`hyuav.envs.observation.ObservationLayout.place` has it.
             clock: (N, ..., 1), what the clock then shows; without one it does not matter.
         """
         outputs = self.network(self.afterstate.at(place, clock)) * self._scale
@@ -61,7 +62,7 @@ class ControlVariate(nn.Module):
     def _of(self, batch: TensorDictBase) -> tuple[Tensor, Tensor]:
         """As :meth:`forward`, of a mini-batch; the mode, which the fading decides, is not used."""
         following = batch["next", "observation"]
-        return self(self.layout.position(following), self.layout.clock(following))
+        return self(self.layout.place(batch), self.layout.clock(following))
 
     @torch.no_grad()
     def control_term(self, batch: TensorDictBase) -> Tensor:

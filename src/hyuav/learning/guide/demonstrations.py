@@ -25,22 +25,24 @@ class Demonstrations(nn.Module):
     best_return: Tensor
     """(N,), of each; minus infinity before the first."""
     actions: Tensor
-    """(T, N, 2)."""
+    """(T, N, actions)."""
     trajectory: Tensor
-    """(T, N, 2), where each was after each slot, in units of half the map's side."""
+    """(T, N, actions), where each was after each slot and at which power, as
+    :meth:`hyuav.envs.observation.ObservationLayout.place` has it."""
     planned_actions: Tensor
-    """(T, N, 2), of the flight to try."""
+    """(T, N, actions), of the flight to try."""
     planned_trajectory: Tensor
-    """(T, N, 2), where that leads."""
+    """(T, N, actions), where that leads."""
     own_trajectory: Tensor
-    """(T, N, 2), where the actors flew when they were last evaluated."""
+    """(T, N, actions), where the actors flew when they were last evaluated."""
     behind: Tensor
     """(N,) bool, of which learners the actor's own flight is worth clearly less than the best."""
 
     def __init__(self, learners: int, scenario: Scenario, return_margin: float) -> None:
         super().__init__()
-        shape = scenario.num_slots, learners, 2
         self._layout = ObservationLayout(scenario, clock=True)
+        self._by_helper = scenario.num_helpers, scenario.action_size
+        shape = scenario.num_slots, learners, self._layout.action_size
         self._return_margin = return_margin
         self._slots_per_unit = scenario.num_slots / 2
         self._reach = scenario.max_speed * scenario.slot_duration / (scenario.map_side / 2)
@@ -56,8 +58,8 @@ class Demonstrations(nn.Module):
         """Keep a flight where it is better than the best before.
 
         Args:
-            actions: (T, N, 2).
-            trajectory: (T, N, 2), where they led.
+            actions: (T, N, actions).
+            trajectory: (T, N, actions), where they led.
             earned: (N,), what it earned or what is to be expected of it.
         """
         better = earned > self.best_return
@@ -70,7 +72,7 @@ class Demonstrations(nn.Module):
         self.plan(self.actions, self.trajectory)
 
     def plan(self, actions: Tensor, trajectory: Tensor) -> None:
-        """Let these actions, with the trajectory that they lead along, be planned: (T, N, 2)."""
+        """Let these actions, with the trajectory that they lead along, be planned."""
         self.planned_actions.copy_(actions)
         self.planned_trajectory.copy_(trajectory)
 
@@ -83,16 +85,29 @@ class Demonstrations(nn.Module):
         self.behind.copy_(self.best_return > own + self._return_margin * own.abs())
 
     def demonstrate(self, observation: Tensor) -> Tensor:
-        """Actions (N, K, 2) that join the best flights by the next slot, or as soon as possible.
+        """Actions (N, K, actions) that join the best flights by the next slot, or when possible.
 
-        Before there is one, they hover.
+        Their powers are those of the flights. Before there is one, they hover.
 
         Args:
             observation: (N, K, ...), with a clock.
         """
         clock = self._layout.clock(observation).squeeze(-1)
         flown = ((clock + 1.0) * self._slots_per_unit).round().long()
-        slot = flown.clamp(max=len(self.actions) - 1).unsqueeze(-1).expand(*flown.shape, 2)
-        position = torch.take_along_dim(self.trajectory.transpose(0, 1), slot, dim=1)
-        action = (position - self._layout.position(observation)) / self._reach
+        size = self.trajectory.shape[-1]
+        slot = flown.clamp(max=len(self.actions) - 1).unsqueeze(-1).expand(*flown.shape, size)
+        place = torch.take_along_dim(self.trajectory.transpose(0, 1), slot, dim=1)
+        position, power = place.unflatten(-1, self._by_helper).tensor_split([2], dim=-1)
+        own = self._layout.position(observation).view_as(position)
+        action = torch.cat([(position - own) / self._reach, power], dim=-1).flatten(-2)
         return action.clamp(-1.0, 1.0).nan_to_num(0.0)
+
+    def hover(self, observation: Tensor) -> Tensor:
+        """Actions (N, K, actions) that stay, at the powers of :meth:`demonstrate`.
+
+        Args:
+            observation: (N, K, ...), with a clock.
+        """
+        action = self.demonstrate(observation).unflatten(-1, self._by_helper)
+        velocity, power = action.tensor_split([2], dim=-1)
+        return torch.cat([torch.zeros_like(velocity), power], dim=-1).flatten(-2)

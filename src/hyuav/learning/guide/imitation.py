@@ -51,11 +51,12 @@ class Imitation:
         return replace(self._algorithm, steps=tuple(steps.values()))
 
     def actions(self, observation: Tensor) -> Tensor:
-        """The A demonstrated actions (N, A, K, 2) for observations (N, K, observed)."""
-        hovering = observation.new_zeros(*observation.shape[:-1], 2)
+        """The A demonstrated actions (N, A, K, actions) for observations (N, K, observed)."""
+        flights = self._flights
         if not self._clock:
-            return hovering.unsqueeze(1)
-        return torch.stack([hovering, self._flights.demonstrate(observation)], dim=1)
+            size = flights.actions.shape[-1]
+            return observation.new_zeros(*observation.shape[:-1], size).unsqueeze(1)
+        return torch.stack([flights.hover(observation), flights.demonstrate(observation)], dim=1)
 
     def worth(self, observation: Tensor) -> Tensor:
         """What the target critics hold of the best one, less the margin: (N, K, 1)."""
@@ -87,7 +88,7 @@ class Imitation:
 
     @torch.no_grad()
     def _rate(self, weights: TensorDictParams, observation: Tensor, actions: Tensor) -> Tensor:
-        """What the critics, with these weights, hold of actions (N, ..., K, 2): (N, ..., K, 1).
+        """What the critics, with these weights, hold of actions (N, ..., K, ...): (N, ..., K, 1).
 
         Of several critics it is the least.
         """

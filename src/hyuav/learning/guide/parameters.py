@@ -56,6 +56,9 @@ class Guide(Parameters):
     """After each episode from the end of the warm-up on: how many straight flights are judged, and
     as many variations of the best; see :class:`hyuav.learning.guide.proposals.TrajectoryProposals`.
     The reward model that judges them needs the control variate."""
+    power_levels: Count = parameter(6)
+    """Where power is controlled: how many levels, evenly apart in dB and others in every episode,
+    are tried in each slot of an imagined flight, beside its own."""
     displacement_range: Annotated[float, Field(ge=1.0, le=1e6)] = parameter(40.0)
     """Ratio of the largest typical displacement of a variation, which is what is flown in a slot,
     to the smallest."""

@@ -1,5 +1,6 @@
 """The guide of the robust variants: which flight of each learner is its best, and which is next."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -27,6 +28,15 @@ from hyuav.learning.guide.proposals import TrajectoryProposals
 from hyuav.learning.guide.reward_model import RewardModel
 from hyuav.learning.guide.warm_up import WarmUp
 from hyuav.learning.weights import draw_weights
+
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+"""Its multiples fill the unit interval evenly."""
+
+_Flights = tuple[Tensor, Tensor]
+"""Actions (T, N, D, actions), and the trajectories that they lead along."""
+
+_Judged = tuple[_Flights, Tensor]
+"""Flights, and what they are held to bring, (N, D) bps/Hz."""
 
 
 class Planner(Guidance):
@@ -77,7 +87,7 @@ class Planner(Guidance):
         return RewardModel(learners, variate, scale, self.guide)
 
     def _random_streams(self) -> dict[str, RowStream]:
-        """``guesses`` (N, F) and ``variations`` (N, D, 5), as far as they are needed."""
+        """``guesses`` (N, F) and ``variations`` (N, D, ...), as far as they are needed."""
         shapes: dict[str, tuple[int, ...]] = {}
         if self._judging is not None and self.guide.keeps_flights:
             shapes["guesses"] = (self._judging.size,)
@@ -127,9 +137,9 @@ class Planner(Guidance):
             return super().control_term(slot)
         return self.reward_model.variate.control_term(slot)
 
-    def end_evaluation(self, positions: Tensor) -> None:
+    def end_evaluation(self, trajectory: Tensor) -> None:
         """Remember where the actors fly, to be judged beside the best flights."""
-        self.flights.own_trajectory.copy_(positions)
+        self.flights.own_trajectory.copy_(trajectory)
 
     def end_episode(self, episode: int, flown: TensorDictBase, stored: TensorDictBase) -> None:
         """Keep the flight where it is the best so far, or one that is better still; plan the next.
@@ -141,7 +151,7 @@ class Planner(Guidance):
         if self._judging is not None:
             self._judge(self._judging, episode, flown, stored)
             return
-        trajectory = self._layout.position(flown["next", "observation"])
+        trajectory = self._layout.place(flown)
         earned = flown["next", "reward"] - self._control_terms(flown)
         self.flights.keep(flown["action"], trajectory, earned.sum(dim=(0, 2)))
         self.flights.plan_best()
@@ -157,24 +167,60 @@ class Planner(Guidance):
         flights, updates = self.flights, self.guide.updates(episode)
         if updates:
             model.update(stored, next(self.streams["guesses"]))
-        trajectory = self._layout.position(flown["next", "observation"])
+        trajectory = self._layout.place(flown)
         known = model.judge(flights.trajectory)[0].nan_to_num(-torch.inf)
         flights.best_return.copy_(known)
         flights.keep(flown["action"], trajectory, model.judge(trajectory)[0])
         if self.guide.imagined_flights and episode >= self.guide.warm_up_episodes:
             normals = next(self.streams["variations"])
             imagined = self._proposals.fly(episode, flights, normals)
-            expected, guessed = model.judge(imagined[1])
-            flights.keep(*_highest(imagined, expected), expected.amax(dim=1))
+            (expecting, expected), (guessing, guessed) = self._judged(model, episode, imagined)
+            flights.keep(*_highest(expecting, expected), expected.amax(dim=1))
             if updates:
-                flights.plan(*_highest(imagined, guessed))
+                flights.plan(*_highest(guessing, guessed))
         elif updates:
             flights.plan_best()
         flights.compare(model.judge(flights.own_trajectory)[0])
 
+    def _judged(
+        self, model: RewardModel, episode: int, imagined: _Flights
+    ) -> tuple[_Judged, _Judged]:
+        """Flights with what is to be expected of them, and with what the last guess holds.
 
-def _highest(flights: tuple[Tensor, Tensor], values: Tensor) -> tuple[Tensor, Tensor]:
-    """Of flights, actions and trajectories (T, N, D, 2), each learner's of the highest value."""
-    index = values.argmax(dim=1)[None, :, None, None].expand(len(flights[0]), -1, 1, 2)
+        Where power is controlled they are flown at those powers of which most is to be expected, or
+        by the guess: beside its own, each slot may have one of some levels, others in every
+        episode. Helpers take turns.
+        """
+        if not self._scenario.power_control:
+            expected, guessed = model.judge(imagined[1])
+            return (imagined, expected), (imagined, guessed)
+        column = 3 * (episode % self._scenario.num_helpers) + 2
+        count, (actions, trajectory) = self.guide.power_levels, imagined
+        levels = torch.arange(count, dtype=actions.dtype, device=actions.device)
+        levels = (levels + math.modf(episode * GOLDEN)[0]) * (2.0 / count) - 1.0
+        own = trajectory[..., column : column + 1]
+        powers = torch.cat([own, levels.expand(*own.shape[:-1], -1)], dim=-1)
+        candidates = trajectory.unsqueeze(-2).repeat_interleave(powers.shape[-1], dim=-2)
+        candidates[..., column] = powers
+        judged = []
+        for values, index in model.choose(candidates):
+            power = torch.take_along_dim(powers, index.unsqueeze(-1), dim=-1)
+            judged.append((_at(imagined, column, power), values))
+        expecting, guessing = judged
+        return expecting, guessing
+
+
+def _at(flights: _Flights, column: int, power: Tensor) -> _Flights:
+    """Flights at another power (T, N, D, 1), which stands in this column."""
+    actions, trajectory = (
+        torch.cat([each[..., :column], power, each[..., column + 1 :]], dim=-1) for each in flights
+    )
+    return actions, trajectory
+
+
+def _highest(flights: _Flights, values: Tensor) -> _Flights:
+    """Each learner's flight of the highest value (N, D)."""
+    shape = len(flights[0]), -1, 1, flights[0].shape[-1]
+    index = values.argmax(dim=1)[None, :, None, None].expand(shape)
     actions, trajectory = (torch.take_along_dim(each, index, dim=2).squeeze(2) for each in flights)
     return actions, trajectory

@@ -8,7 +8,7 @@ from torch import Tensor
 from hyuav.envs.transforms import WITHIN
 from hyuav.learning.guide.demonstrations import Demonstrations
 from hyuav.learning.guide.parameters import Guide
-from hyuav.learning.guide.warm_up import EVENLY, destinations
+from hyuav.learning.guide.warm_up import destinations, evenly
 from hyuav.physics.slot import Physics
 
 
@@ -32,11 +32,12 @@ class TrajectoryProposals:
         self._guide, self._physics = guide, physics
         self._places = torch.arange(flights, dtype=torch.float64, device=physics.device)
         limit = physics.norm_limit(schemes)
-        self._norm_limit = None if limit is None else limit.unsqueeze(1)
-        self._learners = len(schemes)
-        self.normals = (flights, 5)
+        self._norm_limit = None if limit is None else limit[:, None, :, None]
+        self._learners, scenario = len(schemes), physics.scenario
+        self._by_helper = scenario.num_helpers, scenario.action_size
+        self._multiples = evenly(2 * scenario.num_helpers)
+        self.normals = (flights, 3 + 2 * scenario.num_helpers)
         """Shape of the standard normal numbers that make the variations of one learner."""
-        scenario = physics.scenario
         self._half_side = scenario.map_side / 2
         self._reach = scenario.max_speed * scenario.slot_duration / self._half_side
 
@@ -46,32 +47,35 @@ class TrajectoryProposals:
         Args:
             episode: in which straight flights lead to other places than in those before.
             flights: which are varied, the best and the one that was planned last.
-            normals: (N, D, 5), standard normal.
+            normals: (N, D, 3 + 2 H), standard normal.
 
         Returns:
-            the actions (T, N, 2 D, 2), and where they lead, in units of half the map's side.
+            the actions (T, N, 2 D, actions), and where they lead.
         """
-        towards = torch.cat([self._straight(episode), self._variations(flights, normals)], dim=2)
-        position = self._physics.nodes.helper.flatten().expand(*towards.shape[1:])
+        varied, powers = self._variations(flights, normals)
+        towards = torch.cat([self._straight(episode), varied], dim=2)
+        power = torch.cat([torch.zeros_like(powers), powers], dim=2)
+        position = self._physics.nodes.helper.expand(*towards.shape[1:])
         actions, trajectory = [], []
-        for target in towards:
+        for target, own in zip(towards, power, strict=True):
             action = ((target - position / self._half_side) / self._reach).clamp(-1.0, 1.0)
             velocity = self._physics.velocity(action, self._norm_limit)
             position = self._physics.move(position, velocity).position
-            actions.append(action)
-            trajectory.append(position / self._half_side)
+            actions.append(torch.cat([action, own], dim=-1).flatten(-2))
+            trajectory.append(torch.cat([position / self._half_side, own], dim=-1).flatten(-2))
         return torch.stack(actions), torch.stack(trajectory)
 
     def _straight(self, episode: int) -> Tensor:
-        """Where to fly in each slot: (T, N, D, 2)."""
+        """Where to fly in each slot: (T, N, D, H, 2)."""
         places = self._places + len(self._places) * episode
-        share = torch.stack([torch.frac(places * multiple) for multiple in EVENLY], dim=-1)
+        share = torch.stack([torch.frac(places * each) for each in self._multiples], dim=-1)
         spread = self._guide.destination_spread
         ends = destinations(share.to(self._physics.dtype), spread) * WITHIN
+        ends = ends.unflatten(-1, (-1, 2))
         return ends.expand(self._physics.scenario.num_slots, self._learners, *ends.shape)
 
-    def _variations(self, flights: Demonstrations, normals: Tensor) -> Tensor:
-        """The same of variations."""
+    def _variations(self, flights: Demonstrations, normals: Tensor) -> tuple[Tensor, Tensor]:
+        """The same of variations, and their powers (T, N, D, H, 1 or 0)."""
         varied = len(self._places)
         half = varied - varied // 2
         of_best = flights.trajectory.unsqueeze(2).expand(-1, -1, half, -1)
@@ -84,5 +88,7 @@ class TrajectoryProposals:
         size = self._reach * self._guide.displacement_range**-fineness
         size[:, 0] = 0.0
         displacement = displaced.unsqueeze(-1) * (size.unsqueeze(-1) * normals[..., 3:])
-        trajectory = torch.cat([of_best, of_planned], dim=2) + displacement
-        return trajectory.nan_to_num(0.0).clamp(-WITHIN, WITHIN)
+        places = torch.cat([of_best, of_planned], dim=2).unflatten(-1, self._by_helper)
+        position, power = places.nan_to_num(0.0).tensor_split([2], dim=-1)
+        position = position + displacement.view_as(position)
+        return position.clamp(-WITHIN, WITHIN), power

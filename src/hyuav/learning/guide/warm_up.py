@@ -1,5 +1,7 @@
 """Flights to places all over the map, before anything is known of them."""
 
+import math
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
@@ -8,16 +10,25 @@ from torch import Tensor
 from hyuav.learning.guide.parameters import Guide
 from hyuav.physics.scenario import Scenario
 
-EVENLY = (0.7548776662466927, 0.5698402909980532)
-"""Multiples of both fill the unit square evenly (Roberts, "The unreasonable effectiveness of
-quasirandom sequences", 2018)."""
+
+def evenly(dimensions: int) -> list[float]:
+    """Numbers whose multiples, of all together, fill the unit cube of so many dimensions evenly.
+
+    They are the powers of 1 / x, where x^(dimensions + 1) = x + 1 (Roberts, "The unreasonable
+    effectiveness of quasirandom sequences", 2018).
+    """
+    root = 2.0
+    for _ in range(50):  # Newton's method; by products alone, which all machines round alike
+        power = math.prod([root] * dimensions)
+        root -= (power * root - root - 1.0) / ((dimensions + 1) * power - 1.0)
+    return [1.0 / math.prod([root] * (count + 1)) for count in range(dimensions)]
 
 
 def destinations(share: Tensor, spread: float) -> Tensor:
     """Places all over the map, its edges more densely, in units of half the map's side.
 
     Args:
-        share: (..., 2) in [0, 1).
+        share: (..., coordinates) in [0, 1).
         spread: where they are drawn, in units of the map; those beyond it are brought to its edge.
     """
     return ((2.0 * share - 1.0) * spread).clamp(-1.0, 1.0)
@@ -30,7 +41,9 @@ class WarmUp(TensorDictModuleBase):
     surroundings, where a far region takes many slots in one direction and little is earned on the
     way. From episode to episode the destinations fill the map evenly, and its edges more densely;
     each learner draws where in their sequence it begins, so that they cover the map whatever the
-    seed, and in an order of its own. A little noise shows what is beside the trajectory.
+    seed, and in an order of its own. A little noise shows what is beside the trajectory. Each
+    helper has destinations of its own, and where its power is controlled, that is drawn anew in
+    each slot, evenly in dB.
 
     Args:
         learners: N; each flies on its own.
@@ -45,21 +58,26 @@ class WarmUp(TensorDictModuleBase):
         super().__init__()
         self._guide, self._half_side = guide, scenario.map_side / 2
         self._reach = scenario.max_speed * scenario.slot_duration
-        self.register_buffer("origin", torch.zeros(learners, 2))
+        self._by_helper = scenario.num_helpers, scenario.action_size
+        coordinates = 2 * scenario.num_helpers
+        self.register_buffer("origin", torch.zeros(learners, coordinates))
         self.register_buffer("episode", torch.zeros(learners, 1))
-        self.register_buffer("multiples", torch.tensor(EVENLY), persistent=False)
+        self.register_buffer("multiples", torch.tensor(evenly(coordinates)), persistent=False)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Read ``action`` (N, 2), ``step_count`` (N, 1) and ``position`` (N, 1, 2) m; act."""
+        """Read ``action``, ``step_count`` (N, 1) and ``position`` (N, H, 2) m; act."""
         action, begins = tensordict["action"], tensordict["step_count"] == 0
-        normal = torch.randn_like(action)
-        anywhere = torch.special.ndtr(normal)
+        drawn = torch.randn_like(action).unflatten(-1, self._by_helper)
+        normal, for_power = drawn.tensor_split([2], dim=-1)
+        anywhere = torch.special.ndtr(normal).flatten(-2)
         self.origin.copy_(torch.where(begins & (self.episode == 0), anywhere, self.origin))
         self.episode.add_(begins)
         share = torch.frac(self.origin + self.episode * self.multiples)
         destination = destinations(share, self._guide.destination_spread) * self._half_side
-        towards = (destination - tensordict["position"].flatten(-2)) / self._reach
-        flown = (towards + self._guide.warm_up_noise * normal).clamp(-1.0, 1.0)
+        towards = (destination.view_as(normal) - tensordict["position"]) / self._reach
+        velocity = (towards + self._guide.warm_up_noise * normal).clamp(-1.0, 1.0)
+        power = 2.0 * torch.special.ndtr(for_power) - 1.0
+        flown = torch.cat([velocity, power], dim=-1).flatten(-2)
         over = self.episode > self._guide.warm_up_episodes
         tensordict["action"] = torch.where(over, action, flown)
         return tensordict
