@@ -34,13 +34,13 @@ def gains_of(*values: float, dtype: torch.dtype = torch.float64) -> Links:
 
 def relaying(gains: Links, ue: float, helper: float, noise: float) -> AchievableRates:
     """The rates through the one helper, at powers in W."""
-    power = torch.tensor([helper / noise], dtype=gains.helper_legitimate.dtype)
+    power = [helper / noise]
     return secrecy.relay_rates(gains, Sent(ue / noise, power, power), 0, [], "independent")
 
 
 def jamming(gains: Links, ue: float, helper: float, noise: float) -> AchievableRates:
     """The rates of the straight links while the one helper jams, at powers in W."""
-    power = torch.tensor([helper / noise], dtype=gains.helper_legitimate.dtype)
+    power = [helper / noise]
     return secrecy.straight_rates(gains, Sent(ue / noise, power, power), [0], "independent")
 
 

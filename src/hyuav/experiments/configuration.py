@@ -232,7 +232,8 @@ def _completed(group: str, member: str, values: Config) -> Config:
         defaults = LoggerParameters.defaults()
     else:
         preset = values.get("name", member)
-        defaults = offered(values.get("layout", preset if preset in PRESETS else NAMES[0]))
+        known = preset if preset in PRESETS else NAMES[0]
+        defaults = offered(str(values.get("layout", known)))
         defaults.pop("ue_positions", None)
     completed = {**defaults, **values}
     for name, own in defaults.items():

@@ -54,9 +54,9 @@ class HelperActors(LearnerMLP):
         )
         self._layout, self._is_one, self._told = layout, is_one, told
 
-    def forward(self, observation: Tensor) -> Tensor:
+    def forward(self, *inputs: Tensor) -> Tensor:
         """Map observations (N, ..., observed) to actions (N, ..., H actions)."""
-        seen = self._layout.of_each(observation)
+        seen = self._layout.of_each(*inputs)
         if self._told:
             which = torch.eye(self._told, dtype=seen.dtype, device=seen.device)
             seen = torch.cat([seen, which.expand(*seen.shape[:-1], self._told)], dim=-1)

@@ -139,8 +139,8 @@ def _number(axes: Axes, number: int, end: NDArray[np.float64], color: str) -> No
     """Tell which of several helpers ends there, beside the star, towards the middle of the map."""
     axes.annotate(
         str(number),
-        end,
-        np.where(end > 0, -7.0, 7.0),
+        (float(end[0]), float(end[1])),
+        tuple(np.where(end > 0, -7.0, 7.0).tolist()),
         textcoords="offset points",
         ha="center",
         va="center",
