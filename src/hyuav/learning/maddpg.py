@@ -54,8 +54,9 @@ class HelperActors(LearnerMLP):
         )
         self._layout, self._is_one, self._told = layout, is_one, told
 
-    def forward(self, observation: Tensor) -> Tensor:
-        """Map observations (N, ..., observed) to actions (N, ..., H actions)."""
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Map an observation (N, ..., observed) to actions (N, ..., H actions)."""
+        (observation,) = inputs
         seen = self._layout.of_each(observation)
         if self._told:
             which = torch.eye(self._told, dtype=seen.dtype, device=seen.device)
