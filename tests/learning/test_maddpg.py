@@ -135,8 +135,8 @@ def test_two_actors_soon_earn_more_than_one_helper_can() -> None:
         num_slots=10,
         fading=False,
     )
-    rates = {"actor_learning_rate": 1e-3, "critic_learning_rate": 1e-3, "reward_scale": 0.05}
-    algorithm = MADDPG(hidden_sizes=(64, 64), geofence=True, **rates)
+    rates: dict[str, Any] = {"actor_learning_rate": 1e-3, "critic_learning_rate": 1e-3}
+    algorithm = MADDPG(hidden_sizes=(64, 64), geofence=True, reward_scale=0.05, **rates)
     parameters = TrainingParameters(
         num_episodes=30, batch_size=64, evaluation_every=10, evaluation_episodes=1, compile="never"
     )
