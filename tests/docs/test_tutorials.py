@@ -19,7 +19,11 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted((ROOT / "docs" / "tutorials").glob("*.md")), ROOT / "docs" / "index.md"]
 
-OPTIONAL = {"stable_baselines3": "stable_baselines3", "policy": "onnxruntime"}
+OPTIONAL = {
+    "stable_baselines3": "stable_baselines3",
+    "policy": "onnxruntime",
+    "agents": "pettingzoo",
+}
 """What a page needs beyond the library."""
 
 _FENCE = re.compile(r'^```(python|sh)(?: title="([\w.]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)

@@ -18,7 +18,11 @@ EASY = dataclasses.replace(
 """Jamming pays within two slots of the start: a small network finds it in few episodes."""
 
 
-@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+NAMES = sorted(set(ALGORITHMS) - {"maddpg"})
+"""Without the one that is DDPG where there is one helper."""
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
     torch.set_num_threads(1)
     robust = name.endswith("robust")
@@ -38,7 +42,7 @@ def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+@pytest.mark.parametrize("name", NAMES)
 def test_learning_curves_do_not_depend_on_how_fast_they_are_made(name: str) -> None:
     """Compiled and side by side, or eager and alone: the same seeds learn the same, in the mean.
 

@@ -12,6 +12,7 @@ from torch import Tensor
 from hyuav import DDPG, MADDPG, Scenario, Training, TrainingParameters
 from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.maddpg import actor_loss
+from hyuav.references.optimum import solve_optimum
 
 ONE = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=4)
 THREE = dataclasses.replace(ONE, helper_starts=((-60.0, -60.0), (60.0, -60.0), (0.0, 20.0)))
@@ -117,6 +118,33 @@ def test_the_actors_follow_the_policy_gradient_of_the_paper(shared: bool) -> Non
     torch.testing.assert_close(gradients, torch.autograd.grad(expected.sum(), weights))
     critic = algorithm.loss.value_network_params.parameters()
     assert all(weight.grad is None for weight in critic)
+
+
+def test_two_actors_soon_earn_more_than_one_helper_can() -> None:
+    torch.set_num_threads(1)
+    left = ((-80, -40), (-70, -55), (-60, -70), (-85, -60), (-65, -45))
+    right = ((70, 60), (60, 75), (80, 50), (75, 70), (55, 60))
+    contested = dataclasses.replace(
+        ONE,
+        ue_positions=(*left, *right),
+        helper_starts=((0, 0), (0, 0)),
+        eavesdropper_positions=((-60, -50), (60, 55)),
+        eavesdropper_altitude=100.0,
+        coverage_radius=120.0,
+        jamming_power=1e-4,
+        num_slots=10,
+        fading=False,
+    )
+    rates: dict[str, Any] = {"actor_learning_rate": 1e-3, "critic_learning_rate": 1e-3}
+    algorithm = MADDPG(hidden_sizes=(64, 64), geofence=True, reward_scale=0.05, **rates)
+    parameters = TrainingParameters(
+        num_episodes=30, batch_size=64, evaluation_every=10, evaluation_episodes=1, compile="never"
+    )
+    training = Training(contested, 3, algorithm, parameters)
+    list(training.episodes())
+    alone = dataclasses.replace(contested, helper_starts=((0, 0),))
+    best = solve_optimum(alone, ["hybrid"], resolution=10.0)["hybrid"].value
+    assert training.best_evaluation.median().item() > 2.0 * best
 
 
 def test_the_helpers_count_where_memory_is_estimated() -> None:

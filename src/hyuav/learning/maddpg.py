@@ -55,8 +55,9 @@ class HelperActors(LearnerMLP):
         self._layout, self._is_one, self._told = layout, is_one, told
 
     def forward(self, *inputs: Tensor) -> Tensor:
-        """Map observations (N, ..., observed) to actions (N, ..., H actions)."""
-        seen = self._layout.of_each(*inputs)
+        """Map an observation (N, ..., observed) to actions (N, ..., H actions)."""
+        (observation,) = inputs
+        seen = self._layout.of_each(observation)
         if self._told:
             which = torch.eye(self._told, dtype=seen.dtype, device=seen.device)
             seen = torch.cat([seen, which.expand(*seen.shape[:-1], self._told)], dim=-1)
