@@ -9,8 +9,11 @@ from hyuav import DDPG, Guide, InputError, Learner, RobustDDPG, Scenario, Traini
 from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.training import TrainingParameters
 
-SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10_000)
-MANY_FLIGHTS = Guide(imagined_flights=100_000)
+SCENARIO = dataclasses.replace(
+    Scenario.preset("two_clusters"), num_slots=10_000, power_control=True
+)
+MANY_FLIGHTS = Guide(imagined_flights=100_000, power_levels=1)
+MANY_LEVELS = Guide(power_levels=10**6)
 
 
 @pytest.mark.parametrize(
@@ -19,6 +22,7 @@ MANY_FLIGHTS = Guide(imagined_flights=100_000)
         ("replay_size", DDPG(), {"replay_size": 10**12}),
         ("hidden_sizes", DDPG(hidden_sizes=(10**7, 10**7)), {}),
         ("imagined_flights", RobustDDPG(guide=MANY_FLIGHTS), {"replay_size": 10_000}),
+        ("power_levels", RobustDDPG(guide=MANY_LEVELS), {"replay_size": 10_000}),
     ],
 )
 def test_what_takes_most_is_named(

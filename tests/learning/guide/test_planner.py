@@ -8,11 +8,13 @@ import torch
 from tensordict import TensorDict, TensorDictBase, lazy_stack
 from torch import Tensor
 
-from hyuav import Guide, InputError, RobustDDPG, Scenario, make_env
+from hyuav import Guide, InputError, RobustDDPG, RobustSAC, RobustTD3, Scenario, make_env
+from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.guide.demonstrations import Demonstrations
 from hyuav.learning.guide.parameters import OFF
 from hyuav.learning.guide.planner import Planner
 from hyuav.learning.guide.reward_model import RewardModel
+from hyuav.learning.guide.robust import Robust
 from hyuav.learning.learners import Learner
 from hyuav.learning.train import Cohort
 
@@ -129,11 +131,11 @@ def test_who_flies_clearly_worse_than_the_best_flight_is_behind(share: float, be
     assert flights.behind.tolist() == [behind] * 2
 
 
-def cohort() -> Cohort:
+def cohort(scenario: Scenario = SCENARIO, kind: type[Robust] = RobustDDPG) -> Cohort:
     guide = Guide(warm_up_episodes=3, update_every=2, repeat_every=2, imagined_flights=40)
-    algorithm = RobustDDPG(hidden_sizes=(8,), guide=guide)
+    algorithm = kind(hidden_sizes=(8,), guide=guide)
     learners = [Learner("jamming", 1), Learner("hybrid", 2)]
-    return Cohort(SCENARIO, learners, algorithm, 60, 8, None)
+    return Cohort(scenario, learners, algorithm, 60, 8, None)
 
 
 def best(trained: Cohort) -> Demonstrations:
@@ -157,6 +159,30 @@ def test_what_was_imagined_is_flown_after_the_warm_up(
     trained.fly()
     stored = trained.stored["action"][18:24]
     torch.testing.assert_close(stored, planned)
+
+
+@pytest.mark.parametrize("kind", [RobustDDPG, RobustTD3, RobustSAC])
+def test_several_helpers_fly_what_was_imagined_at_the_powers_that_were_planned(
+    kind: type[Robust],
+) -> None:
+    starts = ((-60.0, -60.0), (60.0, -60.0))
+    scenario = dataclasses.replace(SCENARIO, helper_starts=starts, power_control=True)
+    trained = cohort(scenario, kind)
+    for _ in range(3):
+        trained.fly()
+    planned, led = best(trained).planned_actions.clone(), best(trained).planned_trajectory.clone()
+    assert planned.shape == (6, 2, 6)
+    trained.fly()
+    flown = trained.stored[18:24]
+    torch.testing.assert_close(flown["action"], planned)
+    place = ObservationLayout(scenario, clock=True).place(flown)
+    torch.testing.assert_close(place, led, rtol=0.0, atol=1e-5)
+    trained.keep_best(4, seed=0)
+    own = best(trained).own_trajectory.unflatten(-1, (2, 3))
+    assert own.isfinite().all()
+    assert (own[:, :, 0] != own[:, :, 1]).all()
+    trained.fly()
+    assert not trained.stopped.any()
 
 
 def test_the_planner_goes_on_with_a_training_that_is_resumed() -> None:

@@ -51,7 +51,10 @@ class Imitation:
         return replace(self._algorithm, steps=tuple(steps.values()))
 
     def actions(self, observation: Tensor) -> Tensor:
-        """The A demonstrated actions (N, A, K, actions) for observations (N, K, observed)."""
+        """The A demonstrated actions (N, A, K, actions) for observations (N, K, observed).
+
+        Helpers hover at the power of the best flight; without a clock, half way down in dB.
+        """
         flights = self._flights
         if not self._clock:
             size = flights.actions.shape[-1]

@@ -69,8 +69,8 @@ class Guide(Parameters):
     """Of the features' mean square sum, what the noise of rewards counts at least, so that the
     reward model's equations can be solved where they are almost without noise."""
     most_ue_features: CountOrZero = parameter(50)
-    """Number of UEs up to which each has features of its own in the reward model; their products
-    are summed over the whole memory."""
+    """Number of UEs, times that of helpers, up to which each has features of its own in the reward
+    model; their products are summed over the whole memory."""
     imitation_weight: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(0.1)
     """How strongly the actor is drawn to a demonstrated action that is worth more than what it
     does; with any weight, the critics' target counts whichever is worth more. See

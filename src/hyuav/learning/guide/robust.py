@@ -80,12 +80,14 @@ class Robust(AlgorithmParameters):
         hidden_size, most = guide.variate_hidden_sizes[-1], guide.most_ue_features
         features = 3 * feature_count(scenario, hidden_size, most)
         stored, flights = sizes["replay_size"], guide.imagined_flights
-        candidates = 1 + guide.power_levels * scenario.power_control
+        imagined = sum(horizons) * 2 * flights * features
+        levels = guide.power_levels * scenario.power_control
         remembered = len(horizons) * stored * (LinkRow.of(scenario).size + features)
         return [
             *needs,
             Need("replay_size", stored, remembered),
-            Need("imagined_flights", flights, sum(horizons) * 2 * flights * candidates * features),
+            Need("imagined_flights", flights, imagined),
+            Need("power_levels", guide.power_levels, imagined * levels),
         ]
 
 
