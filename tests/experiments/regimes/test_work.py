@@ -1,4 +1,5 @@
 import dataclasses
+from typing import Any
 
 import pytest
 import torch
@@ -12,7 +13,7 @@ from hyuav.references.rewards import estimate_return
 OPTIONS = Regimes(resolution=20.0, power_step=10.0, draws=4, evaluation_draws=8, workers=1)
 
 
-def short(**changes: object) -> Scenario:
+def short(**changes: Any) -> Scenario:
     return dataclasses.replace(Scenario.preset("two_clusters"), num_slots=4, **changes)
 
 
@@ -20,7 +21,7 @@ def short(**changes: object) -> Scenario:
 def test_a_point_has_the_values_of_the_optima(fading: bool) -> None:
     scenario = short(fading=fading, jamming_power=1e-3)
     found = solve_point(scenario, OPTIONS)
-    exactly = {"resolution": 20.0, "power_step": 10.0, "draws": 4, "evaluation_draws": 8}
+    exactly: Any = {"resolution": 20.0, "power_step": 10.0, "draws": 4, "evaluation_draws": 8}
     optima = solve_optimum(scenario, **exactly)
     for rule, optimum in optima.items():
         assert found[rule] == optimum.value

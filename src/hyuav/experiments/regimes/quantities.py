@@ -5,7 +5,7 @@ import math
 import typing
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import declared
@@ -48,8 +48,8 @@ def _field(name: str, scenario: Scenario) -> float:
 
 
 def _with_field(name: str, scenario: Scenario, value: float) -> Scenario:
-    whole = isinstance(getattr(scenario, name), int)
-    return dataclasses.replace(scenario, **{name: round(value) if whole else value})
+    changed: Any = {name: round(value) if isinstance(getattr(scenario, name), int) else value}
+    return dataclasses.replace(scenario, **changed)
 
 
 def _eavesdropper_distance(scenario: Scenario) -> float:
@@ -65,13 +65,13 @@ def _with_eavesdropper_distance(scenario: Scenario, metres: float) -> Scenario:
             accepted = "a position with a direction from L, not that of L itself"
             raise InputError(rejection("eavesdropper_positions", position, accepted))
         moved.append(_scaled(position, center, metres / away))
-    return dataclasses.replace(scenario, eavesdropper_positions=moved)
+    return dataclasses.replace(scenario, eavesdropper_positions=tuple(moved))
 
 
 def _with_ue_spread(scenario: Scenario, factor: float) -> Scenario:
     """Move all UEs so that their distances from L are so many times what they were."""
     center = scenario.legitimate_position
-    moved = [_scaled(position, center, factor) for position in scenario.ue_positions]
+    moved = tuple(_scaled(position, center, factor) for position in scenario.ue_positions)
     return dataclasses.replace(scenario, ue_positions=moved)
 
 

@@ -13,6 +13,7 @@ from rich.console import Console
 from hyuav._support.errors import InputError, ScenarioWarning
 from hyuav._support.files import read_parquet, write_durably
 from hyuav._support.terminal import make_progress
+from hyuav.envs.rewards import DEFAULT
 from hyuav.experiments.comparison.processes import Workers
 from hyuav.experiments.configuration import Config
 from hyuav.experiments.regimes.plan import Axes, MapPoint, Regimes
@@ -47,6 +48,7 @@ def solve_point(scenario: Scenario, options: Regimes) -> dict[str, float]:
         draws=options.draws,
         evaluation_draws=options.evaluation_draws,
         seed=options.seed,
+        reward=DEFAULT,
     )
     # One that jams without power is no helper, wherever it is.
     silent = dataclasses.replace(fixed, jamming_power=0.0)

@@ -2,7 +2,7 @@
 
 import io
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -70,7 +70,7 @@ class RegimeMap(NamedTuple):
     """What the scenario itself has of both parameters."""
     own_label: str
 
-    def grid(self, column: str) -> NDArray[np.float64]:
+    def grid(self, column: str) -> NDArray[Any]:
         """A column with a row per y and a column per x."""
         return self.rows[column].to_numpy().reshape(self.axes.y.points, self.axes.x.points)
 
@@ -92,8 +92,7 @@ def read_regimes(directory: Path) -> RegimeMap:
         InputError: a file is missing, damaged or another program's.
     """
     config = read_yaml(directory / "config.yaml")
-    asked = {name: config[name] for name in ("x", "y") if name in config}
-    axes = Axes.from_dict(asked)
+    axes = Axes.from_dict({name: own for name, own in config.items() if name in ("x", "y")})
     name, scenario = named_scenario(config.get("scenario"))
     rows = _read(directory / REGIMES_FILE, axes)
     own = axes.x.quantity.of(scenario), axes.y.quantity.of(scenario)

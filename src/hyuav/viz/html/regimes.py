@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from hyuav.experiments.regimes.plan import Axis
 from hyuav.experiments.regimes.work import SCHEMES
 from hyuav.viz.data.regimes import (
     GAIN_LEVELS,
@@ -119,7 +120,7 @@ def _template(found: RegimeMap) -> str:
 
 
 def _add_own(figure: go.Figure, found: RegimeMap) -> None:
-    (x,), (y,) = ([value] for value in found.own)
+    x, y = found.own
     edge = {"color": "black", "width": 1}
     figure.add_scatter(
         x=[x],
@@ -131,7 +132,7 @@ def _add_own(figure: go.Figure, found: RegimeMap) -> None:
     )
 
 
-def _axis(swept: Any) -> dict[str, Any]:
+def _axis(swept: Axis) -> dict[str, Any]:
     ends = edges(swept)[[0, -1]]
     is_log = swept.scale == "log"
     limits = np.log10(ends) if is_log else ends

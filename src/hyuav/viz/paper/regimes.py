@@ -84,8 +84,8 @@ def _draw_gain(figure: Figure, panel: Panel, found: RegimeMap) -> None:
 def _finish(panel: Panel, found: RegimeMap) -> None:
     x, y = found.axes.x, found.axes.y
     panel.set(xscale=x.scale, yscale=y.scale, xlabel=axis_label(x))
-    panel.set_xlim(edges(x)[[0, -1]])
-    panel.set_ylim(edges(y)[[0, -1]])
+    panel.set_xlim(edges(x)[0], edges(x)[-1])
+    panel.set_ylim(edges(y)[0], edges(y)[-1])
     panel.patch.set(**_HATCH)
     panel.plot(*found.own, zorder=5, **_OWN)
 
