@@ -10,7 +10,7 @@ from types import ModuleType
 import hyuav
 from hyuav._support.errors import InputError, rejection, require_choice
 
-RECIPES = ("train", "evaluate", "reproduce", "compare", "draw", "report", "dashboard")
+RECIPES = ("train", "evaluate", "reproduce", "compare", "regimes", "draw", "report", "dashboard")
 """The commands that are recipes, in the order of the help."""
 
 BENCHMARK = "benchmark", "Measure how fast it is beside its peers, in the repository."

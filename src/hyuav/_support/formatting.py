@@ -1,6 +1,14 @@
-"""How shares, intervals and what may never happen are written in tables."""
+"""How quantities, shares, intervals and what may never happen are written."""
 
 import math
+
+
+def in_words(name: str, unit: str) -> str:
+    """A field's name in words, with its unit."""
+    words = name.replace("_to_air", "-to-air").replace("_k_factor", " K-factor").replace("_", " ")
+    if words.startswith("ue "):
+        words = f"UE {words[3:]}"
+    return f"{words[0].upper()}{words[1:]}" + (f" ({unit})" if unit else "")
 
 
 def percent(share: float | None, digits: int | None = 1) -> str:

@@ -12,6 +12,7 @@ from browser import DESKTOP, PATIENCE, PHONE, BrowserPage, browser, needs_chromi
 from dashboard_runs import write_run
 from dashboard_server import dashboard, recipe
 from hyuav.viz.dashboard.draft import load
+from regime_maps import write_map
 
 pytestmark = [needs_chromium, pytest.mark.slow]
 
@@ -30,6 +31,7 @@ def runs(trained_runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         file.write("41,410,0,hyb")
     (write_run(root, "empty", 1) / "metrics.csv").write_bytes(b"")
     write_run(root, "<img src=x onerror=alert(1)>", 30, scenario="![x](http://example.org/x)")
+    write_map(root / "regimes")
     shutil.copytree(trained_runs / "tiny", root / "tiny", copy_function=shutil.copy)
     return root
 
@@ -184,6 +186,21 @@ def test_a_scenario_is_changed_flown_and_saved(
     assert saved.jamming_power == 0.02
     assert -60.0 <= saved.eavesdropper_positions[0][0] <= -40.0
     assert 40.0 <= saved.eavesdropper_positions[0][1] <= 60.0
+
+
+@WIDTHS
+def test_a_map_of_regimes_tells_the_values_of_its_points(opened: BrowserPage) -> None:
+    page = opened.page
+    go_to(page, "Regimes")
+    plot = page.locator(".js-plotly-plot").first
+    expect(plot.locator(".legendtext").filter(has_text="Jamming")).to_be_visible()
+    rest(page)
+    plot.locator(".nsewdrag").hover()
+    told = plot.locator(".hovertext")
+    expect(told).to_contain_text("Hybrid with power control: ")
+    expect(told).to_contain_text("bps/Hz")
+    page.get_by_text("What power control adds").click()
+    expect(plot.get_by_text("Times the best").first).to_be_visible()
 
 
 @WIDTHS

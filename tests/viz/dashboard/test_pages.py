@@ -11,6 +11,7 @@ from streamlit.testing.v1 import AppTest
 
 from dashboard_runs import SCENARIO, WriteRun, metrics_row
 from hyuav.viz.dashboard.draft import load, save
+from regime_maps import write_map
 
 
 def _runs(root: str) -> None:
@@ -32,6 +33,13 @@ def _explorer(root: str) -> None:
     from hyuav.viz.data.index import RunIndex
 
     explorer_page.show(RunIndex(root))
+
+
+def _regimes(root: str) -> None:
+    from hyuav.viz.dashboard import regimes_page
+    from hyuav.viz.data.index import RunIndex
+
+    regimes_page.show(RunIndex(root))
 
 
 def _followed(root: str) -> None:
@@ -313,3 +321,19 @@ def test_a_run_whose_scenario_is_damaged_is_no_beginning(write: WriteRun, tmp_pa
     page = opened(_explorer, tmp_path / "runs")
     page.selectbox(key="begin").set_value("run damaged").run()
     assert errors(page)[0].startswith("ue_positions = 4: expected")
+
+
+def test_a_map_of_regimes_is_found_shown_and_its_damage_told(tmp_path: Path) -> None:
+    assert errors(empty := opened(_regimes, tmp_path)) == []
+    assert "hyuav regimes" in empty.info[0].value
+    for name in ("one", "sweep/two"):
+        write_map(tmp_path / name)
+    page = opened(_regimes, tmp_path)
+    assert page.selectbox(key="regimes_map").options == ["one", "sweep/two"]
+    assert page.dataframe[0].value["Best at fixed power"].tolist()[:2] == ["No helper", "Relaying"]
+    page.radio(key="regimes_view").set_value("gain").run()
+    assert errors(page) == []
+    assert len(page.get("plotly_chart")) == 1
+    (tmp_path / "sweep" / "two" / "config.yaml").write_text("x: 3")
+    (line,) = errors(page.selectbox(key="regimes_map").set_value("sweep/two").run())
+    assert line.startswith("x = 3: expected names with values")

@@ -1,17 +1,13 @@
 """A comparison's directory: what was asked for, what is done, and what came of it."""
 
-import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from omegaconf import OmegaConf
 
 from hyuav._support.errors import InputError, rejection
-from hyuav._support.files import create_durably, require_writable
-from hyuav._support.yaml_files import read_yaml
 from hyuav.envs.rewards import REWARDS, SUM_RATE
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import PLAIN, Compare, parameters_of, training_episodes
@@ -19,6 +15,7 @@ from hyuav.experiments.comparison.shards import Shard
 from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.configuration import Config
 from hyuav.experiments.evaluation import EvaluationParameters
+from hyuav.experiments.requests import keep_request
 from hyuav.experiments.run_directory import RunConfiguration
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.learning.registry import ALGORITHMS, PEER
@@ -86,22 +83,7 @@ class ComparisonDirectory:
         """Keep what was asked for, or find the same kept."""
         hyperparameters = {name: parameters_of(name).to_dict() for name in self.options.entries}
         request = {**config, "hyperparameters": hyperparameters}
-        file = self.path / "config.yaml"
-        require_writable("output", self.path)
-        with contextlib.suppress(FileExistsError):
-            create_durably(file, OmegaConf.to_yaml(request).encode())
-            return
-        try:
-            asked, kept = _entries(request), self._unsaid | _entries(read_yaml(file))
-        except InputError as error:
-            accepted = f"a comparison's directory (config.yaml: {error})"
-            raise InputError(rejection("output", str(self.path), accepted)) from None
-        for name in (*asked, *kept):
-            if asked.get(name) != kept.get(name):
-                accepted = (
-                    f"a comparison with {name} = {asked.get(name)} (there it is {kept.get(name)})"
-                )
-                raise InputError(rejection("output", str(self.path), accepted))
+        keep_request(self.path, request, WORKING, "a comparison", self._unsaid)
 
     @property
     def _unsaid(self) -> dict[str, Any]:
@@ -111,7 +93,7 @@ class ComparisonDirectory:
             for entry in self.options.entries
             if (name := entry.partition("-")[0]) != PEER
         }
-        return _entries({"shard_learners": Compare.shard_learners, "reward": SUM_RATE, **plain})
+        return {"shard_learners": Compare.shard_learners, "reward": SUM_RATE, **plain}
 
     def _shard(self, entry: str, name: str, num_slots: int, part: range) -> Shard:
         learners = self.options.members
@@ -147,14 +129,3 @@ class ComparisonDirectory:
 def _joined(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """The rows of all tables; one without rows tells nothing of its columns' types."""
     return pd.concat([own for own in tables if len(own)] or tables, ignore_index=True)
-
-
-def _entries(config: Config) -> dict[str, Any]:
-    """The entries on which results depend, by their dotted names."""
-    flat: dict[str, Any] = {}
-    for name, value in config.items():
-        if isinstance(value, dict):
-            flat |= {f"{name}.{key}": entry for key, entry in _entries(value).items()}
-        else:
-            flat[name] = value
-    return {name: value for name, value in flat.items() if not name.startswith(WORKING)}

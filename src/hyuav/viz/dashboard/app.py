@@ -6,10 +6,15 @@ from pathlib import Path
 import streamlit as st
 import torch
 
-from hyuav.viz.dashboard import explorer_page, flights_page, runs_page
+from hyuav.viz.dashboard import explorer_page, flights_page, regimes_page, runs_page
 from hyuav.viz.data.index import RunIndex
 
-PAGES = {"Runs": runs_page, "Flights": flights_page, "Scenario explorer": explorer_page}
+PAGES = {
+    "Runs": runs_page,
+    "Flights": flights_page,
+    "Scenario explorer": explorer_page,
+    "Regimes": regimes_page,
+}
 
 
 @st.cache_resource(show_spinner=False)

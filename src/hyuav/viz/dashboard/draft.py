@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hyuav._support.errors import InputError, rejection
+from hyuav._support.formatting import in_words
 from hyuav._support.parameters import OneOf, declared
 from hyuav.envs.rendering import EAVESDROPPER_LABEL, LEGITIMATE_LABEL
 from hyuav.experiments.scenarios import NAMES
@@ -69,12 +70,8 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
 def label(name: str) -> str:
-    """A field's name, symbol and unit."""
-    words = name.replace("_to_air", "-to-air").replace("_k_factor", " K-factor").replace("_", " ")
-    if words.startswith("ue "):
-        words = f"UE {words[3:]}"
-    unit = FIELDS[name].metadata["unit"]
-    return f"{words[0].upper()}{words[1:]}" + (f" ({unit})" if unit else "")
+    """A field's name and unit."""
+    return in_words(name, FIELDS[name].metadata["unit"])
 
 
 def shown(value: object) -> str:

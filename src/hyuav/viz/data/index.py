@@ -13,6 +13,7 @@ import pandas as pd
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.experiments.metrics import GrowingMetrics, last_metrics
+from hyuav.experiments.regimes.work import REGIMES_FILE
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.data.reading import optima_of, read_evaluation, readable_config, unit_of
 
@@ -113,6 +114,11 @@ class RunIndex:
         """The names of evaluations that are kept apart from any run, with flights to be played."""
         found = _directories(self.root, {"metrics.csv", FLIGHTS_FILE})
         return sorted(self._name(path) for path, files in found if files == {FLIGHTS_FILE})
+
+    def maps(self) -> list[str]:
+        """The names of the maps of regimes that are complete."""
+        found = _directories(self.root, {REGIMES_FILE})
+        return sorted(self._name(path) for path, _ in found)
 
     def _name(self, directory: Path) -> str:
         """The same while a training goes on and when its directory has got its final name."""

@@ -1,0 +1,1 @@
+"""Maps of regimes: which scheme is best, and by how much, over two swept parameters."""
