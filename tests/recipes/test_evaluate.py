@@ -1,5 +1,6 @@
 """Evaluating trained policies elsewhere, from the command line."""
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import pytest
 
 from hyuav import Scenario
+from hyuav.references import bounds
 from recipe_calls import TINY, Call, Refusal
 
 FEW = ("evaluation.episodes=4", "evaluation.resolution=10")
@@ -51,6 +53,31 @@ def test_a_policy_flies_elsewhere_beside_the_optimum_there_and_loses_nothing_of_
     assert parameters["jamming_power"] == 0.2
     assert parameters["ue_positions"] == Scenario.preset("two_clusters").to_dict()["ue_positions"]
     assert (trained / "evaluation.json").read_bytes() == before
+
+
+def test_several_helpers_are_trained_evaluated_and_drawn(
+    call: Call,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(bounds, "MOST_RATES", 10**5)  # which makes them coarse
+    crowded = Scenario.preset("two_eavesdroppers")
+    crowded = dataclasses.replace(crowded, eavesdroppers="colluding", speed_limit="disc")
+    crowded.save(tmp_path / "crowded.yaml")
+    call("train", "scenario=crowded.yaml", "scenario.num_slots=5", "hydra.run.dir=run", *SHORT)
+    call("evaluate", "run=run", "evaluation.episodes=4", "evaluation.resolution=20")
+    told = capsys.readouterr().out
+    assert "no flight exceeds " in told
+    found = summary(tmp_path / "run")["schemes"]
+    best = found["optimum"]
+    assert best["secrecy_sum_rate"]["mean"] <= 1.02 * best["upper_bound"]  # the same but for draws
+    assert {"fraction_of_upper_bound", "relay_share_1", "off_map_2"} <= set(found["proposed"])
+    call("draw", "run=run", "figures=trajectories")
+    assert (tmp_path / "run" / "figures" / "trajectories.pdf").exists()
+    report = (tmp_path / "run" / "report.html").read_text()
+    assert "of own upper bound" in report
+    assert "H 2 " in report
 
 
 REFUSALS = {

@@ -1,17 +1,41 @@
 """Directories of runs: one that was trained, and any that are written at will."""
 
+import dataclasses
 import shutil
 from functools import partial
 from pathlib import Path
 
 import pytest
+import torch
 from rich.console import Console
 
 from dashboard_runs import SCENARIO, WriteRun, configuration, write_run
-from hyuav.experiments.evaluation import EvaluationParameters, evaluate
+from hyuav import Scenario
+from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.experiments.policies import learned_policies, references
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import train
+from hyuav.references.flight import FlightPolicy
+
+
+@pytest.fixture(scope="session")
+def relaying_and_jamming() -> tuple[Scenario, Evaluation]:
+    """Two helpers that hover, of which the first jams and UEs 3, 4, 6 and 7 use the second.
+
+    Two eavesdroppers at one place are as one.
+    """
+    places = ((93.0, 42.0), (-57.0, 9.0))
+    scenario = dataclasses.replace(
+        Scenario.preset("two_clusters"),
+        helper_starts=places,
+        eavesdropper_positions=((80.0, 80.0), (80.0, 80.0)),
+        num_slots=3,
+        fading=False,
+    )
+    policy = FlightPolicy(torch.tensor(places).expand(4, 2, 2), scenario)
+    parameters = EvaluationParameters(episodes=2, flights=1)
+    flown = {"proposed": policy, "optimum": policy, "ja_lt": policy}
+    return scenario, evaluate(scenario, "two", flown, parameters)
 
 
 @pytest.fixture(scope="session")

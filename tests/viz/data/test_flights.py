@@ -1,8 +1,18 @@
-import numpy as np
+import dataclasses
 
-from hyuav import Scenario
+import numpy as np
+import pytest
+
+from hyuav import InputError, Scenario
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.viz.data.flights import energy_table, flight_tables, offloading_table, read_flight
+from hyuav.viz.data.flights import (
+    energy_table,
+    flight_tables,
+    links,
+    offloading_table,
+    read_flight,
+    told_modes,
+)
 
 
 def test_the_tables_hold_the_flights_from_the_start_and_all_nodes(
@@ -47,3 +57,67 @@ def test_offloading_is_told_for_every_ue_and_slot(
     earned = own.groupby("slot")["secrecy_rate"].sum()
     slots = read_flight(scenario, evaluation.flights, "ja_lt").rows
     np.testing.assert_allclose(earned, slots["secrecy_sum_rate"], rtol=1e-5)
+
+
+def test_links_of_several_helpers_are_those_that_are_used(
+    relaying_and_jamming: tuple[Scenario, Evaluation],
+) -> None:
+    scenario, evaluation = relaying_and_jamming
+    flight = read_flight(scenario, evaluation.flights, "proposed")
+    jammer, relay = scenario.helper_starts
+    assert flight.path.shape == (4, 2, 2)
+    assert flight.relay.tolist() == [[False, True]] * 3
+    alive = links(scenario, flight, 1)
+    assert [ue for ue, _ in alive.to_legitimate] == list(scenario.ue_positions)
+    assert alive.to_helper == [(scenario.ue_positions[n - 1], relay) for n in (3, 4, 6, 7)]
+    assert alive.relaying == [(relay, scenario.legitimate_position)]
+    assert alive.jamming == [(jammer, (80.0, 80.0))]
+
+
+def test_a_jammers_link_leads_to_the_nearest_eavesdropper(
+    relaying_and_jamming: tuple[Scenario, Evaluation],
+) -> None:
+    scenario, evaluation = relaying_and_jamming
+    moved = dataclasses.replace(scenario, eavesdropper_positions=((0.0, 0.0), (90.0, 40.0)))
+    flight = read_flight(moved, evaluation.flights, "proposed")
+    assert [end for _, end in links(moved, flight, 0).jamming] == [(90.0, 40.0)]
+
+
+def test_the_tables_tell_each_of_several_helpers_and_eavesdroppers(
+    relaying_and_jamming: tuple[Scenario, Evaluation],
+) -> None:
+    scenario, evaluation = relaying_and_jamming
+    tables = flight_tables(scenario, evaluation.flights, ["proposed"])
+    assert tables[""]["helper"].tolist() == [1] * 4 + [2] * 4
+    assert tables[""][["x", "y"]].drop_duplicates().to_numpy().tolist() == [
+        list(start) for start in scenario.helper_starts
+    ]
+    assert tables["nodes"]["node"].tolist()[-3:] == ["L", "E 1", "E 2"]
+    spent = energy_table(scenario, evaluation.flights)
+    assert spent["node"].unique().tolist()[-3:] == ["L", "H 1", "H 2"]
+    jammed = spent[(spent["scheme"] == "proposed") & (spent["node"] == "H 1")]["energy"]
+    assert jammed.tolist() == pytest.approx([0.08] * 3)  # p_J Delta
+    offloading = offloading_table(scenario, evaluation.flights).query("scheme == 'proposed'")
+    assert offloading["relay_2"].all()
+    assert not offloading["relay_1"].any()
+
+
+def test_flights_of_another_number_of_helpers_are_refused(
+    relaying_and_jamming: tuple[Scenario, Evaluation],
+) -> None:
+    scenario, evaluation = relaying_and_jamming
+    one = dataclasses.replace(scenario, helper_starts=((0.0, 0.0),))
+    with pytest.raises(InputError, match=r"the scenario's 1 helpers, not of 2$"):
+        read_flight(one, evaluation.flights, "proposed")
+
+
+@pytest.mark.parametrize(
+    ("relay", "told"),
+    [
+        ([True], "the helper relays"),
+        ([False, True], "H 1 jams, H 2 relays"),
+        ([False, True, True, True], "3 of 4 helpers relay"),
+    ],
+)
+def test_modes_are_told_in_words(relay: list[bool], told: str) -> None:
+    assert told_modes(np.array(relay)) == told

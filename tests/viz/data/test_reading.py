@@ -4,9 +4,12 @@ from typing import Any
 
 import pytest
 
+from hyuav import Scenario
 from hyuav._support.errors import InputError
+from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.data.reading import (
+    is_drawable,
     optima_of,
     read_evaluation,
     read_flights,
@@ -75,3 +78,17 @@ def test_each_mode_rule_has_its_optimum(evaluated: RunDirectory) -> None:
         "jamming": best["ja_optimum"],
         "relay": best["re_optimum"],
     }
+
+
+def test_flights_of_several_helpers_are_read_where_all_of_their_columns_are_there(
+    relaying_and_jamming: tuple[Scenario, Evaluation], tmp_path: Path
+) -> None:
+    scenario, evaluation = relaying_and_jamming
+    evaluation.save(tmp_path)
+    flights = read_flights(tmp_path)
+    assert is_drawable(flights, scenario)
+    assert not is_drawable(flights, Scenario.preset("two_clusters"))
+    for column in ("relay_2", "way"):
+        flights.drop(columns=column).to_parquet(tmp_path / "flights.parquet")
+        with pytest.raises(InputError, match=rf"\(with {column}\)$"):
+            read_flights(tmp_path)

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 from hyuav import InputError, Scenario
+from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.data.reading import readable_flights
 from hyuav.viz.html.player import flight_player
@@ -141,3 +142,20 @@ def test_flights_over_other_ues_are_refused(flights: pd.DataFrame) -> None:
     alone = Scenario(ue_positions=((0.0, 0.0),))
     with pytest.raises(InputError, match=r"each of the scenario's 1 UEs"):
         flight_player(alone, flights, "proposed")
+
+
+def test_the_player_moves_all_helpers_in_their_modes(
+    relaying_and_jamming: tuple[Scenario, Evaluation],
+) -> None:
+    scenario, evaluation = relaying_and_jamming
+    player = flight_player(scenario, evaluation.flights, "proposed")
+    assert "slot 1 of 3: H 1 jams, H 2 relays<" in player.layout.title.text
+    for frame in player.frames:
+        drawn = {trace.name: trace for trace in frame.data}
+        assert _points(drawn["helper UAV (H)"]) == set(scenario.helper_starts)
+        assert drawn["helper UAV (H)"].text == ("H 1", "H 2")
+        assert drawn["eavesdropper (E)"].text == ("E 1", "E 2")
+        assert _segments(drawn["UE → H"]) == 4
+        assert [_segments(drawn[name]) for name in ("H → L, relays", "H → E, jams")] == [1, 1]
+        (x, y) = (np.mean(drawn["coverage of H, relaying"][axis]) for axis in "xy")
+        assert (x, y) == pytest.approx(scenario.helper_starts[1], abs=2.0)

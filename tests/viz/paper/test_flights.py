@@ -37,3 +37,14 @@ def test_trajectories_lie_over_the_optimums_flight(
     assert [line.get_marker() for line in own if line.get_marker() in ("D", "*")] == ["D", "*"]
     assert {"Proposed", "Optimum", "start", "end", "coverage of L"} <= set(texts(figure))
     assert not {"Re-OT", "Ja-OT", "Re-LT"} & set(texts(figure))
+
+
+def test_each_of_several_helpers_has_its_line_and_its_number(
+    relaying_and_jamming: tuple[Scenario, Evaluation],
+) -> None:
+    scenario, evaluation = relaying_and_jamming
+    (axes,) = trajectories(scenario, evaluation.flights).axes
+    assert [text.get_text() for text in axes.texts] == ["1", "2"]
+    ends = [line.get_xydata() for line in axes.lines if line.get_marker() == "*"]
+    assert [tuple(own) for (own,) in map(np.asarray, ends)] == list(scenario.helper_starts)
+    assert texts(axes.figure).count("Proposed") == texts(axes.figure).count("Optimum") == 1  # type: ignore[arg-type]

@@ -42,3 +42,17 @@ def test_a_scheme_alone_can_be_drawn(scenario: Scenario, evaluation: Evaluation)
     of_modes, *_ = offloading_by_slot(offloading_table(scenario, alone)).axes
     assert [tick.get_text() for tick in of_modes.get_yticklabels()] == ["Ja-LT"]
     assert energy_by_slot(energy_table(scenario, alone)).axes[0].images
+
+
+def test_each_of_several_helpers_has_its_energies_and_its_modes(
+    relaying_and_jamming: tuple[Scenario, Evaluation],
+) -> None:
+    scenario, evaluation = relaying_and_jamming
+    of_nodes = energy_by_slot(energy_table(scenario, evaluation.flights)).axes
+    labels = [axes.get_ylabel() for axes in of_nodes]
+    assert labels[:4] == ["UE", "Energy of L (J)", "Energy of H 1 (kJ)", "Energy of H 2 (kJ)"]
+    of_modes, *_ = offloading_by_slot(offloading_table(scenario, evaluation.flights)).axes
+    told = [tick.get_text() for tick in of_modes.get_yticklabels()]
+    assert told == ["Proposed, H 1", "Proposed, H 2", "Optimum, H 1", "Optimum, H 2"]
+    modes = np.asarray(of_modes.images[0].get_array())
+    assert modes.tolist() == [[1] * 3, [2] * 3] * 2  # jamming, relay

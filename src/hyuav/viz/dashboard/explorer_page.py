@@ -257,10 +257,8 @@ def _tell_accuracy(scenario: Scenario, rule: str, evaluation: Evaluation) -> Non
     spacing, draws = resolution(scenario, fine=fine), FINE_DRAWS if fine else COARSE_DRAWS
     told, mapped = "The optimum is exact", "The map is"
     if scenario.num_helpers > 1:
-        told, mapped = (
-            "The optimum is the best flight that was found",
-            "The map is of one alone and",
-        )
+        told = "The optimum is the best flight that was found"
+        mapped = "The map is of one helper alone and"
     bound = evaluation.summary["schemes"][OPTIMA[rule]].get("upper_bound")
     st.caption(
         f"{told} on a grid of {spacing:g} m with {draws} draws of the fading; "

@@ -42,6 +42,8 @@ def explorer_map(scenario: Scenario, rule: str, quantity: str) -> go.Figure:
             hovertemplate="helper at (%{x:.0f}, %{y:.0f}) m: %{z} UEs<extra></extra>",
         )
     unit = " (bps/Hz)" if quantity == "rate" else f" (of {scenario.num_ues})"
+    if scenario.num_helpers > 1:
+        unit = f", one helper alone{unit}"
     figure.data[0].update(colorbar=_colorbar(QUANTITIES[quantity] + unit))
     figure.update_traces(showlegend=False, selector={"type": "contour"})
     figure.update_yaxes(constraintoward="top")  # on a narrow page the square leaves room below

@@ -183,17 +183,20 @@ def _line(x: Any, y: Any, style: dict[str, Any], name: str, *, legend: bool = Fa
 
 
 def _uavs(positions: Sequence[Point], label: str, symbol: str, color: str) -> Trace:
-    """UAVs of one role, numbered where there are several."""
+    """UAVs of one role, with their letter and number beside them where there are several."""
     x, y = map(list, zip(*positions, strict=True))
-    count = len(positions)
+    role, _, letter = label.removesuffix(")").partition(" (")
+    called = names(letter, len(positions))
     return trace(
         "scatter",
         x=x,
         y=y,
-        text=[label if count == 1 else f"{label} {number}" for number in range(1, count + 1)],
+        text=called,
+        textposition="bottom right",
+        textfont={"size": 11, "color": color, "weight": "bold"},
         name=label,
-        mode="markers",
+        mode="markers" if len(positions) == 1 else "markers+text",
         marker={"symbol": symbol, "size": 14, "color": color, "line": {"width": 3, "color": color}},
-        hovertemplate="%{text}<br>(%{x:.1f}, %{y:.1f}) m<extra></extra>",
+        hovertemplate=f"{role} (%{{text}})<br>(%{{x:.1f}}, %{{y:.1f}}) m<extra></extra>",
         cliponaxis=False,
     )

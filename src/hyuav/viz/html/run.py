@@ -62,6 +62,11 @@ def _facts(
     facts = {"Scenario": name}
     if scenario is not None:
         facts["UEs"] = str(scenario.num_ues)
+        if scenario.num_helpers > 1:
+            facts["Helpers"] = str(scenario.num_helpers)
+        if scenario.num_eavesdroppers > 1:
+            kind = scenario.eavesdroppers
+            facts["Eavesdroppers"] = f"{scenario.num_eavesdroppers}, {kind}"
     for title, section, entry in (
         ("Algorithm", "algorithm", "name"),
         ("Episodes asked for", "training", "num_episodes"),
@@ -179,6 +184,8 @@ def map_section(scenarios: Mapping[str, Scenario]) -> Section:
         "dashed one around where jamming is; elsewhere neither brings anything. The dotted circle "
         "is the coverage of the legitimate UAV."
     ]
+    if any(scenario.num_helpers > 1 for scenario in scenarios.values()):
+        notes.append("Where there are several helpers, it is what one of them brings alone.")
     return Section("Maps", notes, pictures)
 
 
