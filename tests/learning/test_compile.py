@@ -25,12 +25,12 @@ TWO_HELPERS = dataclasses.replace(SCENARIO, helper_starts=((-60.0, -60.0), (60.0
 LEARNERS = [Learner("hybrid", 1), Learner("relay", 2), Learner("jamming", 3)]
 CASES = [
     ("ddpg", SCENARIO, "sum_rate"),
-    ("ddpg", FADELESS, "sum_rate"),
-    ("td3", SCENARIO, "sum_rate"),
     ("ddpg_robust", SCENARIO, "sum_rate"),
-    ("ddpg", SCENARIO, "proportional_fairness"),
+    pytest.param("ddpg", FADELESS, "sum_rate", marks=pytest.mark.slow),
+    pytest.param("td3", SCENARIO, "sum_rate", marks=pytest.mark.slow),
+    pytest.param("ddpg", SCENARIO, "proportional_fairness", marks=pytest.mark.slow),
     pytest.param("ddpg_robust", SCENARIO, "secrecy_energy_efficiency", marks=pytest.mark.slow),
-    pytest.param("td3", FADELESS, "sum_rate", marks=pytest.mark.slow),
+    ("td3", FADELESS, "sum_rate"),
     pytest.param("td3_robust", FADELESS, "sum_rate", marks=pytest.mark.slow),
     pytest.param("sac", SCENARIO, "sum_rate", marks=pytest.mark.slow),
     pytest.param("sac_robust", SCENARIO, "sum_rate", marks=pytest.mark.slow),
@@ -152,7 +152,9 @@ def trained(learners: list[Learner], **changes: Any) -> Training:
 @pytest.mark.parametrize(
     ("cohorts", "learners"),
     [
-        (1, [Learner(scheme, 4) for scheme in MODE_RULES]),  # who share their luck
+        pytest.param(  # who share their luck
+            *(1, [Learner(scheme, 4) for scheme in MODE_RULES]), marks=pytest.mark.slow
+        ),
         (2, [Learner("hybrid", seed) for seed in range(4)]),
     ],
 )

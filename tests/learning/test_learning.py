@@ -21,8 +21,13 @@ EASY = dataclasses.replace(
 NAMES = sorted(set(ALGORITHMS) - {"maddpg"})
 """Without the one that is DDPG where there is one helper."""
 
+FAST = "ddpg_robust"
+"""The one of them that learns in every run of the tests."""
 
-@pytest.mark.parametrize("name", NAMES)
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name == FAST else pytest.mark.slow) for name in NAMES]
+)
 def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
     torch.set_num_threads(1)
     robust = name.endswith("robust")

@@ -35,7 +35,7 @@ def test_an_earlier_evaluation_its_figures_and_its_report_stay(
     call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with small_disk(tmp_path / "disk", megabytes=32) as disk:
-        call("train", "hydra.run.dir=disk/run", *TINY)
+        call("train", "hydra.run.dir=disk/run", "scenario.num_slots=5", *TINY)
         call(*EVALUATE)
         line = halted(disk, call, capsys, *EVALUATE)
         assert line.startswith("error: halted: disk/run/flights.parquet: ")

@@ -44,7 +44,7 @@ def flown(trained: Cohort) -> torch.Tensor:
     return torch.as_tensor(trained.stored["action"][latest(trained.replay, SCENARIO.num_slots)])
 
 
-@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_every_nth_episode_takes_the_actions_of_each_learners_best(compiled: bool) -> None:
     trained = cohort(repeat_every=3, warm_up_episodes=2)
     rewards: list[torch.Tensor] = []

@@ -144,7 +144,7 @@ def best(trained: Cohort) -> Demonstrations:
     return planning.flights
 
 
-@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_what_was_imagined_is_flown_after_the_warm_up(
     compiled: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
