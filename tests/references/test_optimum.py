@@ -20,6 +20,12 @@ REFERENCE = {
     "two_clusters": {10: (20.842, 20.842, 16.318), 20: (59.080, 44.762, 56.663)},
 }
 
+WITH_FADING = {
+    "random_disk": {10: (20.3961, 17.4378, 16.3201), 20: (61.0166, 35.7993, 56.9283)},
+    "two_clusters": {10: (19.9985, 19.9982, 16.2615), 20: (59.8561, 42.9732, 56.6992)},
+}
+"""Likewise, averaged over the default draws on a grid of 4 m, as in the first version."""
+
 
 def without_fading(name: str = "two_clusters", **changes: Any) -> Scenario:
     return dataclasses.replace(Scenario.preset(name), fading=False, **changes)
@@ -44,6 +50,15 @@ def test_reaches_the_values_of_the_specification(name: str) -> None:
     for horizon, values in expected.items():
         optima = [found[scheme][horizon].value for scheme in MODE_RULES]
         assert optima == pytest.approx(values, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", WITH_FADING)
+def test_averages_over_the_fading_as_it_did_in_the_first_version(name: str) -> None:
+    expected = WITH_FADING[name]
+    found = solve_horizons(Scenario.preset(name), list(expected), resolution=4.0)
+    for horizon, values in expected.items():
+        optima = [found[scheme][horizon].value for scheme in MODE_RULES]
+        assert optima == pytest.approx(values, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", REFERENCE)
