@@ -13,4 +13,5 @@ def test_a_scheme_is_measured_against_the_optimum_of_its_mode_rule() -> None:
         **dict.fromkeys(("proposed", "proposed_paper", "optimum"), "optimum"),
         **dict.fromkeys(("ja_ot", "ja_ot_paper", "ja_lt", "ja_optimum"), "ja_optimum"),
         **dict.fromkeys(("re_ot", "re_ot_paper", "re_lt", "re_optimum"), "re_optimum"),
+        "no_helper": None,
     }

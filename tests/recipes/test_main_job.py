@@ -37,7 +37,7 @@ def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
         *("animation.gif", "trajectories_nodes.csv", "flight_map_nodes.csv")
     }
     horizons = pd.read_csv(job / "figures" / "horizons.csv")
-    assert horizons.groupby("num_slots")["scheme"].count().to_dict() == {8: 8, 10: 8}
+    assert horizons.groupby("num_slots")["scheme"].count().to_dict() == {8: 9, 10: 9}
     proposed = horizons[horizons["scheme"] == "proposed"].set_index("num_slots")
     assert proposed["learners"].to_dict() == {8: 2, 10: 1}
     beside = RunDirectory(job / "random_disk")
@@ -98,7 +98,7 @@ def test_a_terminal_shows_progress_of_all_that_takes_time_and_a_pipe_gets_none(
         ("initial weights", 3),
         ("training", 4),
         ("optima", 3),
-        ("evaluating", 11),
+        ("evaluating", 12),
         ("figures", 2),
         ("reports", 1),
     ):

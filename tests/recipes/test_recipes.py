@@ -166,7 +166,7 @@ def test_saved_runs_are_evaluated_offline(
     call("evaluate", "run=[hybrid,relay,jamming]", "output=together", *few)
     summary = json.loads((tmp_path / "together" / "evaluation.json").read_text())
     assert set(summary["schemes"]) == {
-        *("proposed", "re_ot", "ja_ot", "re_lt", "ja_lt"),
+        *("proposed", "re_ot", "ja_ot", "re_lt", "ja_lt", "no_helper"),
         *("optimum", "re_optimum", "ja_optimum"),
     }
     assert (tmp_path / "together" / "flights.parquet").exists()
@@ -191,7 +191,7 @@ def test_the_main_job_trains_evaluates_and_draws(call: Call, tmp_path: Path) -> 
         *SHORT,
     )
     summary = json.loads((tmp_path / "job" / "evaluation.json").read_text())
-    assert len(summary["schemes"]) == 11
+    assert len(summary["schemes"]) == 12
     assert {"proposed", "proposed_paper", "re_ot_paper", "ja_ot_paper"} <= set(summary["schemes"])
     paper = RunDirectory(tmp_path / "job" / "as_in_paper").configuration()
     assert paper.algorithm == DDPG()

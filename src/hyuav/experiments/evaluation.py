@@ -180,13 +180,16 @@ def fly(
     """Fly all learners of a policy through the same episodes, with diagnostics.
 
     A :class:`hyuav.Policy` flies in the environment that it was trained in, but for the scenario
-    and who chooses the mode; any other in that of :func:`hyuav.make_env`.
+    and who chooses the mode; any other in that of :func:`hyuav.make_env`. The scenario is as
+    :meth:`.schemes.Scheme.flown_in` has it.
     """
+    own = SCHEMES[scheme]
     trained_in, learners = {}, 1
     if isinstance(policy, Policy):
         trained_in, learners = policy.environment, policy.learners
     seeds = [derived_seed(parameters.seed, "evaluation")] * learners
-    asked = {"scenario": scenario, "scheme": SCHEMES[scheme].mode_rule, "reward": reward}
+    flown_in = own.flown_in(scenario)
+    asked = {"scenario": flown_in, "scheme": own.mode_rule, "reward": reward}
     env = make_env(
         **{**trained_in, **asked},
         batch_size=(learners, parameters.episodes),
@@ -201,9 +204,9 @@ def fly(
         flown = env.step(module(state))
         found = _per_slot(flown["next"])
         if reward != DEFAULT:
-            own = flown["next", "reward"]
-            off_map = flown["next", "off_map"].sum(dim=-1, keepdim=True, dtype=own.dtype)
-            found["reward"] = (own + scenario.off_map_penalty * off_map).squeeze(-1)
+            earned = flown["next", "reward"]
+            off_map = flown["next", "off_map"].sum(dim=-1, keepdim=True, dtype=earned.dtype)
+            found["reward"] = (earned + scenario.off_map_penalty * off_map).squeeze(-1)
         for name, values in found.items():
             totals[name] = totals[name] + values if name in totals else values.double()
         slots.append(flown["next"][0, : parameters.flights].cpu())

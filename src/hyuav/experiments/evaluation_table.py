@@ -58,7 +58,7 @@ def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
     """
     rate = result.get("reward", result["secrecy_sum_rate"])
     mean, (low, high) = rate["mean"], rate["ci95"]
-    digits = 1 if "reward" in result and abs(mean) >= 100.0 else 2
+    digits = 1 if abs(mean) >= 100.0 else 2
     hybrid = percent(result.get("fraction_of_hybrid_optimum"))
     return (
         interval(mean, low, high, digits),

@@ -10,13 +10,13 @@ from hyuav._support.terminal import make_progress, print_line
 from hyuav.envs.reward import Reward
 from hyuav.envs.rewards import DEFAULT
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
+from hyuav.experiments.schemes import LABELS, LEARNED, NO_HELPER, OPTIMA
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
 from hyuav.references.flight import FlightPolicy
 from hyuav.references.objectives import why_no_optimum
 from hyuav.references.optimum import solve_optimum
-from hyuav.references.straight import ja_lt, re_lt
+from hyuav.references.straight import ja_lt, no_helper, re_lt
 
 Policies = dict[str, list[TensorDictModuleBase]]
 """By scheme."""
@@ -80,8 +80,11 @@ def learned_policies(
 
 
 def straight_policies(scenario: Scenario) -> tuple[Policies, list[str]]:
-    """Re-LT and Ja-LT, and a line for each that is too fast for the scenario and left out."""
-    policies: Policies = {}
+    """Re-LT, Ja-LT and no helper, and a line for each that is too fast for the scenario.
+
+    What is too fast is left out.
+    """
+    policies: Policies = {NO_HELPER: [no_helper(scenario)]}
     left_out = []
     for name, straight in {"re_lt": re_lt, "ja_lt": ja_lt}.items():
         try:
@@ -94,7 +97,7 @@ def straight_policies(scenario: Scenario) -> tuple[Policies, list[str]]:
 def reference_policies(
     scenario: Scenario, resolution: float | None, console: Console, reward: Reward = DEFAULT
 ) -> Policies:
-    """Re-LT, Ja-LT and the exact optimum of each mode rule, where there is one.
+    """Re-LT, Ja-LT, no helper, and the exact optimum of each mode rule, where there is one.
 
     Args:
         scenario: to fly.

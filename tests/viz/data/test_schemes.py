@@ -1,10 +1,10 @@
 from hyuav.experiments.schemes import LABELS, OPTIMA
-from hyuav.viz.data.schemes import COLORS, COMPARED, scheme_line, scheme_place
+from hyuav.viz.data.schemes import COLORS, DRAWN, scheme_line, scheme_place
 
 
-def test_the_five_schemes_differ_in_color_and_those_that_only_jam_are_dashed() -> None:
-    assert len({COLORS[scheme] for scheme in COMPARED}) == 5
-    lines = {scheme: scheme_line(scheme) for scheme in COMPARED}
+def test_the_drawn_schemes_differ_in_color_and_those_that_only_jam_are_dashed() -> None:
+    assert len({COLORS[scheme] for scheme in DRAWN}) == 6
+    lines = {scheme: scheme_line(scheme) for scheme in DRAWN}
     assert {scheme for scheme, line in lines.items() if line == "dashed"} == {"ja_ot", "ja_lt"}
 
 

@@ -33,7 +33,7 @@ def test_the_offloading_figure_counts_ues_and_leaves_out_who_computes_itself(
     empty = np.ma.getmaskarray(np.ma.asarray(of_ues.images[0].get_array()))
     np.testing.assert_array_equal(empty, ~sent)
     counts = {str(line.get_label()): line.get_ydata() for line in of_counts.lines}
-    assert set(counts) == {"Proposed", "Re-LT", "Ja-LT"}
+    assert set(counts) == {"Proposed", "Re-LT", "Ja-LT", "No helper"}
     np.testing.assert_array_equal(counts["Proposed"], sent.sum(axis=0))
 
 

@@ -8,8 +8,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from hyuav._support.errors import InputError, rejection
+from hyuav.experiments.schemes import NO_HELPER
 from hyuav.physics.scenario import Point, Scenario
-from hyuav.viz.data.schemes import COMPARED
+from hyuav.viz.data.schemes import DRAWN, scheme_place
 
 MODE_ROWS = ("proposed", "optimum")
 """The schemes whose helper chooses its mode."""
@@ -75,6 +76,16 @@ def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode:
         np.hstack([np.array(lists["ue_energy"], dtype=float), others]),
         rows,
     )
+
+
+def flying_schemes(flights: pd.DataFrame) -> list[str]:
+    """The schemes in which a helper flies, in the order of every table.
+
+    Args:
+        flights: a row per slot, as in :attr:`hyuav.experiments.evaluation.Evaluation.flights`.
+    """
+    flown = dict.fromkeys(flights["scheme"].astype(str))
+    return sorted((scheme for scheme in flown if scheme != NO_HELPER), key=scheme_place)
 
 
 def first_flights(
@@ -148,7 +159,7 @@ def energy_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
     """
     budget = budgets(scenario)
     tables = []
-    for flight in first_flights(scenario, flights, COMPARED).values():
+    for flight in first_flights(scenario, flights, DRAWN).values():
         columns = {
             **_slots(flight, len(budget)),
             "node": list(budget) * flight.num_slots,
@@ -171,7 +182,7 @@ def offloading_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
         ``offloading``, and its ``secrecy_rate`` in bps/Hz.
     """
     num_ues, tables = scenario.num_ues, []
-    for flight in first_flights(scenario, flights, (*COMPARED, *MODE_ROWS)).values():
+    for flight in first_flights(scenario, flights, (*DRAWN, *MODE_ROWS)).values():
         columns = {
             **_slots(flight, num_ues),
             "relay": flight.relay.repeat(num_ues),

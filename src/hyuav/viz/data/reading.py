@@ -14,7 +14,7 @@ from hyuav._support.files import read_parquet
 from hyuav._support.yaml_files import read_yaml
 from hyuav.envs.rewards import REWARDS, SUM_RATE
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
-from hyuav.experiments.schemes import LABELS, OPTIMA
+from hyuav.experiments.schemes import LABELS, NO_HELPER, OPTIMA
 
 _PER_UE = {"offloading", "secrecy_rate", "ue_energy"}
 _FLIGHT_COLUMNS = {
@@ -100,13 +100,17 @@ def unit_of(config: Mapping[str, Any]) -> str:
     return "" if known is None else known.unit
 
 
-def optima_of(evaluation: Mapping[str, Any]) -> dict[str, float]:
-    """By mode rule, what the best flight earns by the reward, where it was evaluated."""
+def references_of(evaluation: Mapping[str, Any]) -> dict[str, float]:
+    """What learners are set beside, by the reward, as far as it was evaluated.
+
+    Returns:
+        what the best flight earns by mode rule, and under :data:`NO_HELPER` what comes without one.
+    """
     results = evaluation["schemes"]
     return {
-        rule: float(earned(results[optimum])["mean"])
-        for rule, optimum in OPTIMA.items()
-        if optimum in results
+        name: float(earned(results[scheme])["mean"])
+        for name, scheme in {**OPTIMA, NO_HELPER: NO_HELPER}.items()
+        if scheme in results
     }
 
 

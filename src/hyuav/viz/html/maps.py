@@ -35,6 +35,7 @@ def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 
 def map_figure(scenario: Scenario, brings: HelperMap, mode: Mode) -> go.Figure:
     """What :func:`sum_rate_map` draws, of a map that is computed already."""
     axis, rates = brings.axis, brings.rates
+    title = f"Secrecy sum-rate (bps/Hz); without a helper {brings.without_helper:.2f}"
     figure = go.Figure(layout=base_layout())
     figure.add_heatmap(
         x=axis,
@@ -44,7 +45,7 @@ def map_figure(scenario: Scenario, brings: HelperMap, mode: Mode) -> go.Figure:
         zmax=max(float(rates["better"].max()), 1e-6),
         colorscale="Viridis",
         colorbar={
-            "title": {"text": "Secrecy sum-rate (bps/Hz)", "side": "bottom"},
+            "title": {"text": title, "side": "bottom"},
             "orientation": "h",
             "thickness": 12,
             "y": -0.16,

@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from hyuav.viz.data.flights import MODE_ROWS
-from hyuav.viz.data.schemes import COLORS, COMPARED, scheme_label, scheme_line
+from hyuav.viz.data.schemes import COLORS, DRAWN, scheme_label, scheme_line
 from hyuav.viz.paper.style import (
     COLUMN_WIDTH,
     LINES,
@@ -83,7 +83,7 @@ def offloading_by_slot(table: pd.DataFrame) -> Figure:
         image = _by_ue(of_ues, rates, max(own["secrecy_rate"].max(), 0.1))
         label = f"Secrecy rate of each UE, {scheme_label(first)} (bps/Hz)"
         figure.colorbar(image, ax=of_ues, location="top", label=label, aspect=35)
-        for name in (name for name in schemes if name in COMPARED):
+        for name in (name for name in schemes if name in DRAWN):
             count = schemes[name].groupby("slot")["offloading"].sum()
             of_counts.plot(count.index, count, **_look(name))
         of_counts.set(xlabel="Slot", ylabel="UEs that offload", ylim=(0, 1.08 * len(rates)))
