@@ -276,3 +276,18 @@ def test_the_optimum_flies_with_the_power_that_was_chosen() -> None:
         mean = found[scheme]["secrecy_sum_rate"]["mean"]
         assert mean == pytest.approx(best[rule].value, rel=1e-4)
     assert found["optimum"]["secrecy_sum_rate"]["mean"] > found["re_lt"]["secrecy_sum_rate"]["mean"]
+
+
+def test_the_power_along_the_flight_is_kept_where_a_scheme_chooses_it() -> None:
+    controlled = dataclasses.replace(SCENARIO, power_control=True)
+    path = torch.tensor(SCENARIO.helper_starts).expand(SCENARIO.num_slots + 1, 1, 2)
+    share = torch.logspace(0.0, -6.0, SCENARIO.num_slots).unsqueeze(1)  # all of the range
+    flying = {
+        "re_lt": re_lt(SCENARIO),
+        "optimum_power": FlightPolicy(path, controlled, share),
+    }
+    found = evaluate(SCENARIO, "power", flying, FEW)
+    level = found.flights.groupby("scheme")["power_level"]
+    assert level.count().to_dict() == {"optimum_power": 2 * SCENARIO.num_slots, "re_lt": 0}
+    own = level.get_group("optimum_power").to_numpy()[: SCENARIO.num_slots]
+    np.testing.assert_allclose(own, np.linspace(0.0, -60.0, SCENARIO.num_slots), atol=1e-3)

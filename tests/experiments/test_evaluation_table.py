@@ -8,7 +8,12 @@ from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.evaluation_table import print_results
 
 
-def printed(name: str = "square", reward: dict[str, str] | None = None, **more: Any) -> list[str]:
+def printed(
+    name: str = "square",
+    reward: dict[str, str] | None = None,
+    scheme: str = "proposed",
+    **more: Any,
+) -> list[str]:
     result = {
         "secrecy_sum_rate": {"mean": 59.824, "ci95": [59.661, 59.984]},
         "fraction_of_hybrid_optimum": 0.9994,
@@ -17,10 +22,10 @@ def printed(name: str = "square", reward: dict[str, str] | None = None, **more: 
         "off_map": 12.04,
         "budget_violations": 0.0,
     }
-    schemes = {"proposed": result | more}
+    schemes = {scheme: result | more}
     summary = {"scenario": name, "num_slots": 20, "episodes": 1000, "schemes": schemes}
     if reward is not None:
-        schemes["proposed"]["reward"] = {"mean": 1390.85, "ci95": [1389.1, 1392.6]}
+        schemes[scheme]["reward"] = {"mean": 1390.85, "ci95": [1389.1, 1392.6]}
         summary["reward"] = reward
     file = io.StringIO()
     print_results(Evaluation(summary, pd.DataFrame()), Console(file=file, width=80))
@@ -46,6 +51,16 @@ def test_another_reward_stands_before_the_sum_rate_within_80_columns() -> None:
         *("11.8", "%", "79.0", "%", "12.0"),
     ]
     assert {"(bit/Hz/J)", "(bps/Hz)"} <= {word for line in lines for word in line.split()}
+    assert max(map(len, lines)) <= 80
+
+
+def test_more_than_a_hundred_and_more_than_ten_times_the_optimum_stay_within_80_columns() -> None:
+    rate = {"mean": 771.52, "ci95": [771.28, 771.81]}
+    more = {"fraction_of_optimum": 1.0, "fraction_of_hybrid_optimum": 12.896}
+    lines = printed(secrecy_sum_rate=rate, **more, scheme="proposed_power")
+    row = next(line for line in lines if line.lstrip().startswith("Proposed, power"))
+    assert row.split()[2:7] == ["771.5", "[771.3,", "771.8]", "100.0", "%"]
+    assert row.split()[7:9] == ["1290", "%"]
     assert max(map(len, lines)) <= 80
 
 

@@ -209,7 +209,10 @@ def fly(
             found["reward"] = (earned + scenario.off_map_penalty * off_map).squeeze(-1)
         for name, values in found.items():
             totals[name] = totals[name] + values if name in totals else values.double()
-        slots.append(flown["next"][0, : parameters.flights].cpu())
+        kept = flown["next"][0, : parameters.flights].cpu()
+        if flown_in.power_control:
+            kept["power_level"] = power_level(flown["action"][0, : parameters.flights], flown_in)
+        slots.append(kept)
         state = env.step_mdp(flown)
     return Flights(
         {name: values.cpu() for name, values in totals.items()}, torch.stack(slots, dim=1)
@@ -236,6 +239,12 @@ def _per_slot(after: TensorDictBase) -> dict[str, Tensor]:
         "edge_energy": diagnostics["edge_energy"].squeeze(-1),
         "helper_energy": diagnostics["helper_energy"].sum(dim=-1),
     }
+
+
+def power_level(action: Tensor, scenario: Scenario) -> Tensor:
+    """The power of each helper in dB below the nominal one: (..., H), from actions (..., 3 H)."""
+    chosen = action.unflatten(-1, (scenario.num_helpers, -1))[..., 2].clamp(-1.0, 1.0)
+    return (scenario.power_range * (chosen - 1.0) / 2).cpu()
 
 
 def secrecy_sum_rate(flown: TensorDictBase) -> Tensor:
@@ -291,7 +300,8 @@ def _account(totals: Mapping[str, Tensor], scenario: Scenario) -> dict[str, Any]
 def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
     """Flights (episodes, T) as a table with a row per slot; lists hold one entry per UE.
 
-    With several helpers, whose numbers are columns ``x_1``, ``x_2`` and so on.
+    With several helpers, whose numbers are columns ``x_1``, ``x_2`` and so on. Where their power is
+    controlled, ``power_level`` is in dB relative to the nominal one.
     """
     episodes, num_slots = flown.batch_size
     diagnostics = flown["diagnostics"]
@@ -310,6 +320,8 @@ def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
         **_of_helpers("helper_energy", diagnostics["helper_energy"]),
         "budget_violation": diagnostics["budget_violation"],
     }
+    if "power_level" in flown:
+        columns |= _of_helpers("power_level", flown["power_level"])
     table = pd.DataFrame(
         {
             name: values.flatten().numpy() if isinstance(values, Tensor) else values

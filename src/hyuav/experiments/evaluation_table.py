@@ -25,7 +25,7 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
     )
     earned = "\n".join(wrap(earned_title(summary), WIDTH, break_on_hyphens=False))
     beside = "sum-rate\n(bps/Hz)" if "reward" in summary else "hybrid\noptimum"
-    columns = "own\noptimum", beside, "relay\nslots", "UEs off-\nloading", "off\nmap"
+    columns = "own\noptimum", beside, "relay\nslots", "UEs\noff-\nloading", "off\nmap"
     table = results_table(title, "Scheme", earned, *columns)
     for scheme, result in summary["schemes"].items():
         table.add_row(LABELS[scheme], *flight_cells(result))
@@ -59,7 +59,8 @@ def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
     rate = result.get("reward", result["secrecy_sum_rate"])
     mean, (low, high) = rate["mean"], rate["ci95"]
     digits = 1 if abs(mean) >= 100.0 else 2
-    hybrid = percent(result.get("fraction_of_hybrid_optimum"))
+    share = result.get("fraction_of_hybrid_optimum")
+    hybrid = percent(share, 1 if share is None or share < 10.0 else 0)
     return (
         interval(mean, low, high, digits),
         percent(result.get("fraction_of_optimum")),

@@ -10,13 +10,23 @@ from hyuav._support.terminal import make_progress, print_line
 from hyuav.envs.reward import Reward
 from hyuav.envs.rewards import DEFAULT
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.experiments.schemes import LABELS, LEARNED, NO_HELPER, OPTIMA
+from hyuav.experiments.schemes import (
+    LABELS,
+    LEARNED,
+    NO_HELPER,
+    OPTIMA,
+    OPTIMUM_POWER,
+    SCHEMES,
+)
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
 from hyuav.references.flight import FlightPolicy
 from hyuav.references.objectives import why_no_optimum
-from hyuav.references.optimum import solve_optimum
+from hyuav.references.optimum import RESOLUTION, solve_optimum
 from hyuav.references.straight import ja_lt, no_helper, re_lt
+
+POWER_RESOLUTION = 2.0
+"""Of the grid in m, at the finest, on which all powers are tried at each place."""
 
 Policies = dict[str, list[TensorDictModuleBase]]
 """By scheme."""
@@ -99,6 +109,8 @@ def reference_policies(
 ) -> Policies:
     """Re-LT, Ja-LT, no helper, and the exact optimum of each mode rule, where there is one.
 
+    One helper whose power is nominal is set beside the hybrid optimum with chosen power, too.
+
     Args:
         scenario: to fly.
         resolution: of the optimum's grid in m; None for the default.
@@ -115,4 +127,11 @@ def reference_policies(
         optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario, optimum.share)]
+    if scenario.num_helpers == 1 and not scenario.power_control and reward == DEFAULT:
+        controlled = SCHEMES[OPTIMUM_POWER].flown_in(scenario)
+        spacing = max(resolution or RESOLUTION, POWER_RESOLUTION)
+        with make_progress(console, "optimum, power") as progress:
+            tracked = {"resolution": spacing, "track": progress.track}
+            best = solve_optimum(controlled, ["hybrid"], **tracked)["hybrid"]
+        policies[OPTIMUM_POWER] = [FlightPolicy(best.path, controlled, best.share)]
     return policies

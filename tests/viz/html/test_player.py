@@ -141,3 +141,19 @@ def test_flights_over_other_ues_are_refused(flights: pd.DataFrame) -> None:
     alone = Scenario(ue_positions=((0.0, 0.0),))
     with pytest.raises(InputError, match=r"each of the scenario's 1 UEs"):
         flight_player(alone, flights, "proposed")
+
+
+def test_the_power_of_each_slot_is_told_where_it_is_chosen(
+    scenario: Scenario, flights: pd.DataFrame
+) -> None:
+    player = flight_player(scenario, flights, "optimum_power")
+    rows = flights[(flights["scheme"] == "optimum_power") & (flights["episode"] == 0)]
+    levels = rows.sort_values("slot")["power_level"].to_numpy()
+    (power,) = [trace for trace in player.data if trace.name == "power of H"]
+    np.testing.assert_allclose(power.y, levels, atol=0.01)
+    assert player.layout.yaxis5.overlaying == "y4"
+    for frame, level in zip(player.frames, levels, strict=True):
+        assert f" at {level:.1f} dB" in frame.layout.title.text
+    nominal = flight_player(scenario, flights, "optimum")
+    assert "power of H" not in {trace.name for trace in nominal.data}
+    assert " dB" not in nominal.layout.title.text

@@ -70,7 +70,8 @@ def test_no_helper_stands_above_a_break_where_it_would_squash_the_papers_schemes
     alone, others = table[is_alone]["mean"], table[~is_alone]["mean"]
     assert upper.get_ylim()[0] < alone.min() <= alone.max() < upper.get_ylim()[1]
     assert others.max() < lower.get_ylim()[1] < 2 * others.max()
-    poor = table.assign(mean=table["mean"].where(~is_alone, others.max()))
+    poor = table.copy()
+    poor.loc[is_alone, ["mean", "low", "high"]] = others.max()
     whole = sum_rates_by_horizon(poor)
     assert len(whole.axes) == 1
     assert "No helper" in {own.get_label() for own in bars_of(whole)}

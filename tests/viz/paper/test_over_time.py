@@ -1,4 +1,5 @@
 import numpy as np
+import pandas as pd
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation
@@ -42,3 +43,18 @@ def test_a_scheme_alone_can_be_drawn(scenario: Scenario, evaluation: Evaluation)
     of_modes, *_ = offloading_by_slot(offloading_table(scenario, alone)).axes
     assert [tick.get_text() for tick in of_modes.get_yticklabels()] == ["Ja-LT"]
     assert energy_by_slot(energy_table(scenario, alone)).axes[0].images
+
+
+def test_the_power_is_drawn_where_a_scheme_chooses_it(
+    scenario: Scenario, evaluation: Evaluation
+) -> None:
+    rows = read_flight(scenario, evaluation.flights, "proposed").rows
+    level = np.linspace(-60.0, 0.0, len(rows))
+    chosen = rows.assign(scheme="proposed_power", power_level=level)
+    flights = pd.concat([evaluation.flights, chosen])
+    *_, of_power = energy_by_slot(energy_table(scenario, flights)).axes[:4]
+    assert of_power.get_ylabel() == "Power of H (dB)"
+    (own,) = [line for line in of_power.lines if line.get_label() == "Proposed, power"]
+    np.testing.assert_allclose(np.asarray(own.get_ydata(orig=True), dtype=float), level)
+    without = energy_by_slot(energy_table(scenario, evaluation.flights))
+    assert "Power of H (dB)" not in {axes.get_ylabel() for axes in without.axes}

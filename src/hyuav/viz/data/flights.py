@@ -32,6 +32,8 @@ class Flight(NamedTuple):
     """Of the UEs, L and H: (T, U + 2) J."""
     rows: pd.DataFrame
     """As they were read, a row per slot."""
+    power_level: NDArray[np.float64] | None
+    """Of the helper, in dB relative to its mode's nominal power: (T,); None where it is nominal."""
 
     @property
     def num_slots(self) -> int:
@@ -67,6 +69,7 @@ def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode:
         accepted = f"lists with an entry for each of the scenario's {scenario.num_ues} UEs"
         raise InputError(rejection("flights", f"{scheme} {episode}", accepted))
     others = rows[["edge_energy", "helper_energy"]].to_numpy(float)
+    level = rows["power_level"].to_numpy(float) if "power_level" in rows else None
     return Flight(
         scheme,
         np.vstack([scenario.helper_starts[0], rows[["x", "y"]].to_numpy(float)]),
@@ -75,6 +78,7 @@ def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode:
         np.array(lists["secrecy_rate"], dtype=float),
         np.hstack([np.array(lists["ue_energy"], dtype=float), others]),
         rows,
+        level if level is not None and np.isfinite(level).all() else None,
     )
 
 
@@ -125,8 +129,8 @@ def flight_tables(
 
     Returns:
         "", the flights: ``scheme``, ``slot`` (0 is the start), ``x`` and ``y`` in m, and whether
-        the helper does ``relay``; "nodes": each ``node`` with its ``x`` and ``y`` in m and the
-        ``coverage`` radius in m of L.
+        the helper does ``relay``, with its ``power_level`` in dB where that is controlled; "nodes":
+        each ``node`` with its ``x`` and ``y`` in m and the ``coverage`` radius in m of L.
     """
     paths = []
     for scheme, flight in first_flights(scenario, flights, schemes).items():
@@ -137,6 +141,8 @@ def flight_tables(
             "y": flight.path[:, 1],
             "relay": [None, *flight.relay.tolist()],
         }
+        if flight.power_level is not None:
+            columns["power_level"] = [np.nan, *flight.power_level.tolist()]
         paths.append(pd.DataFrame(columns))
     places = {f"UE {ue}": place for ue, place in enumerate(scenario.ue_positions, start=1)}
     places |= {"L": scenario.legitimate_position, "E": scenario.eavesdropper_positions[0]}
@@ -154,8 +160,9 @@ def energy_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
         flights: a row per slot, as in :attr:`Evaluation.flights`.
 
     Returns:
-        ``scheme``, ``slot``, ``node`` ("UE 1", ..., "L", "H"), ``energy`` and ``budget`` in J. L
-        spends in a slot what the tasks taken in the slot before need.
+        ``scheme``, ``slot``, ``node`` ("UE 1", ..., "L", "H"), ``energy`` and ``budget`` in J, and
+        the ``power_level`` of H in dB where it is controlled. L spends in a slot what the tasks
+        taken in the slot before need.
     """
     budget = budgets(scenario)
     tables = []
@@ -166,6 +173,8 @@ def energy_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
             "energy": flight.energy.flatten(),
             "budget": list(budget.values()) * flight.num_slots,
         }
+        if flight.power_level is not None:
+            columns["power_level"] = flight.power_level.repeat(len(budget))
         tables.append(pd.DataFrame(columns))
     return pd.concat(tables, ignore_index=True)
 

@@ -16,7 +16,7 @@ from hyuav.experiments.evaluation_table import earned_title
 from hyuav.experiments.metrics import readable_metrics
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.scenarios import named_scenario
-from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, NO_HELPER, OPTIMA
+from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, NO_HELPER
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import learning_curves, learning_table
 from hyuav.viz.data.reading import (
@@ -28,10 +28,13 @@ from hyuav.viz.data.reading import (
     readable_flights,
     references_of,
 )
-from hyuav.viz.data.schemes import DRAWN
+from hyuav.viz.data.schemes import BEST, DRAWN
 
 AS_IN_PAPER = "as_in_paper"
 """Directory of the paper's own algorithm within a main job's run."""
+
+WITH_POWER = "with_power"
+"""The same of the training with the helper's power."""
 
 
 def evaluation_directories(directory: Path) -> list[Path]:
@@ -150,7 +153,7 @@ def horizon_table(summaries: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     rows, title = [], ""
     for summary in sorted(summaries, key=lambda summary: int(summary["num_slots"])):
         title = earned_title(summary)
-        for scheme in (*DRAWN, *OPTIMA.values()):
+        for scheme in (*DRAWN, *BEST):
             if scheme in summary["schemes"]:
                 result = summary["schemes"][scheme]
                 rate = earned(result)

@@ -3,13 +3,24 @@
 from typing import Literal
 
 from hyuav.envs.rendering import OKABE_ITO
-from hyuav.experiments.schemes import LABELS, NO_HELPER, OPTIMA, SCHEMES
+from hyuav.experiments.schemes import (
+    LABELS,
+    NO_HELPER,
+    OPTIMA,
+    OPTIMUM_POWER,
+    PROPOSED_POWER,
+    SCHEMES,
+    Kind,
+)
 
 COMPARED = ("proposed", "ja_ot", "re_ot", "re_lt", "ja_lt")
 """The five schemes of the paper."""
 
-DRAWN = (*COMPARED, NO_HELPER)
+DRAWN = (*COMPARED, PROPOSED_POWER, NO_HELPER)
 """What figures of all schemes show."""
+
+BEST = (*OPTIMA.values(), OPTIMUM_POWER)
+"""The optima that bound them."""
 
 COLORS = {
     "proposed": OKABE_ITO["bluish green"],
@@ -18,6 +29,7 @@ COLORS = {
     "re_lt": OKABE_ITO["sky blue"],
     "ja_lt": OKABE_ITO["orange"],
     NO_HELPER: OKABE_ITO["black"],
+    PROPOSED_POWER: "#882255",
 }
 """The color of each scheme; one learned by the paper's own algorithm has that of the scheme."""
 
@@ -26,6 +38,7 @@ COLORS |= {
     "optimum": COLORS["proposed"],
     "ja_optimum": COLORS["ja_ot"],
     "re_optimum": COLORS["re_ot"],
+    OPTIMUM_POWER: COLORS[PROPOSED_POWER],
 }
 
 APART = 2.0
@@ -54,7 +67,7 @@ def mode_rule(scheme: str) -> str:
 
 def scheme_line(scheme: str) -> Line:
     """Dotted for an optimum, dashed for what only jams, solid for all else."""
-    if scheme in OPTIMA.values():
+    if scheme in SCHEMES and SCHEMES[scheme].kind is Kind.OPTIMUM:
         return "dotted"
     only_jams = mode_rule(scheme) == "jamming" and scheme != NO_HELPER
     return "dashed" if only_jams else "solid"

@@ -3,8 +3,9 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hyuav.envs.rendering import LEGITIMATE_COLOR
+from hyuav.envs.rendering import LEGITIMATE_COLOR, OKABE_ITO
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import Flight, budgets
 from hyuav.viz.html.player_map import Trace, trace
@@ -21,10 +22,10 @@ def highest(flight: Flight) -> list[float]:
 
 
 def fixed_in_panels(flight: Flight) -> list[Trace]:
-    """The sum-rates that each mode would have brought, slot by slot."""
+    """The sum-rates that each mode would have brought, slot by slot, and the helper's power."""
     slots = list(range(1, flight.num_slots + 1))
     rates = flight.rows[["relay_sum_rate", "jamming_sum_rate"]].to_numpy(float).round(4)
-    return [
+    by_mode = [
         _panel(
             4,
             "scatter",
@@ -37,6 +38,22 @@ def fixed_in_panels(flight: Flight) -> list[Trace]:
         )
         for column, (name, dash) in enumerate((("relaying", "solid"), ("jamming", "6px,4px")))
     ]
+    return by_mode if flight.power_level is None else [*by_mode, _power(slots, flight.power_level)]
+
+
+def _power(slots: list[int], level: NDArray[np.float64]) -> Trace:
+    """The helper's power in all slots, a step for each."""
+    steps = _panel(
+        4,
+        "scatter",
+        x=slots,
+        y=level.round(2).tolist(),
+        name="power of H",
+        mode="lines",
+        line={"color": OKABE_ITO["reddish purple"], "width": 1.6, "shape": "hvh"},
+        hovertemplate="slot %{x}: %{y:.1f} dB relative to the nominal power<extra></extra>",
+    )
+    return steps | {"yaxis": "y5"}
 
 
 def _panel(number: int, kind: str, **values: Any) -> Trace:

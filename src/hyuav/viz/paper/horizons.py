@@ -9,14 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hyuav.experiments.schemes import LABELS, NO_HELPER, OPTIMA
-from hyuav.viz.data.schemes import COLORS, COMPARED, DRAWN, is_apart, scheme_line
+from hyuav.experiments.schemes import LABELS, NO_HELPER, PROPOSED_POWER
+from hyuav.viz.data.schemes import BEST, COLORS, COMPARED, DRAWN, is_apart, scheme_line
 from hyuav.viz.paper.style import COLUMN_WIDTH, LINES, STYLE, legend_below
 
 TITLE = "Secrecy sum-rate (bps/Hz)"
 """Of what is earned by default."""
 
-MARKERS = {"proposed": "o", "ja_ot": "s", "re_ot": "^", "re_lt": "v", "ja_lt": "D", NO_HELPER: "P"}
+MARKERS = {"proposed": "o", "ja_ot": "s", "re_ot": "^", "re_lt": "v", "ja_lt": "D"}
+MARKERS |= {NO_HELPER: "P", PROPOSED_POWER: "*"}
 
 
 def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
@@ -29,7 +30,7 @@ def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
     """
     with mpl.rc_context(STYLE):
         curves = {str(name): rows for name, rows in table.groupby("scheme")}
-        drawn = [name for name in (*OPTIMA.values(), *DRAWN) if name in curves]
+        drawn = [name for name in (*BEST, *DRAWN) if name in curves]
         apart = _apart(curves)
         aside: dict[str, float] = {}
         for shown in (apart, set(drawn) - apart):
@@ -65,7 +66,7 @@ def sum_rates_by_horizon(table: pd.DataFrame) -> Figure:
         if apart:
             least = min(curves[scheme]["mean"].min() for scheme in apart)
             upper.set_ylim(bottom=0.8 * least)
-        legend_below(figure, [*handles, optimum], 4, 1.2)
+        legend_below(figure, [*handles, optimum], 3, 1.2)
         return figure
 
 

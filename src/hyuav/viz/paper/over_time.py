@@ -32,6 +32,8 @@ NOTHING = "0.88"
 def energy_by_slot(table: pd.DataFrame) -> Figure:
     """The energy of every UE under one scheme, and of L and of the helper under all.
 
+    Where some scheme chooses the helper's power, that is shown below.
+
     Args:
         table: of :func:`.energy_table`. The UEs are those of its first scheme.
     """
@@ -39,8 +41,12 @@ def energy_by_slot(table: pd.DataFrame) -> Figure:
     nodes = {str(name): rows for name, rows in table.groupby("node", sort=False)}
     ues = [rows[rows["scheme"] == scheme] for name, rows in nodes.items() if name[:2] == "UE"]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(COLUMN_WIDTH, 5.0), layout="constrained")
-        of_ues, of_edge, of_helper = figure.subplots(3, sharex=True, height_ratios=(1.5, 1, 1))
+        with_power = "power_level" in table
+        figure = Figure(figsize=(COLUMN_WIDTH, 5.0 + 1.3 * with_power), layout="constrained")
+        ratios = (1.5, 1, 1, 1) if with_power else (1.5, 1, 1)
+        of_ues, of_edge, of_helper, *of_power = figure.subplots(
+            len(ratios), sharex=True, height_ratios=ratios
+        )
         budget = 1e3 * ues[0]["budget"].iloc[0]
         image = _by_ue(of_ues, [1e3 * rows["energy"] for rows in ues], budget)
         label = f"Energy of each UE, {scheme_label(scheme)} (mJ; budget {budget:g} mJ)"
@@ -53,12 +59,25 @@ def energy_by_slot(table: pd.DataFrame) -> Figure:
             axes.set_ylabel(f"Energy of {node} ({unit})")
             axes.grid()
             axes.set_axisbelow(True)
-        of_helper.set_xlabel("Slot")
+        for axes in of_power:
+            _power_by_slot(axes, nodes["H"])
+        (*_, lowest) = (of_helper, *of_power)
+        lowest.set_xlabel("Slot")
         handles, _ = of_edge.get_legend_handles_labels()
         budget_line = Line2D([], [], color="0.3", linewidth=0.9, linestyle="dashdot")
         budget_line.set_label("budget per slot")
         legend_below(figure, [*handles, budget_line], 3)
         return figure
+
+
+def _power_by_slot(axes: Axes, rows: pd.DataFrame) -> None:
+    """The helper's power in each slot, a step for each, under the schemes that choose it."""
+    for name, own in rows.dropna(subset="power_level").groupby("scheme", sort=False):
+        axes.step(own["slot"], own["power_level"], where="mid", **_look(str(name)))
+    axes.axhline(0.0, color="0.3", linewidth=0.9, linestyle="dashdot")
+    axes.set_ylabel("Power of H (dB)")
+    axes.grid()
+    axes.set_axisbelow(True)
 
 
 def offloading_by_slot(table: pd.DataFrame) -> Figure:
