@@ -5,7 +5,7 @@ import torch
 from benchmarks.work import Work
 from hyuav.experiments.evaluation import EvaluationParameters, evaluate
 from hyuav.experiments.policies import straight_policies
-from hyuav.experiments.schemes import LEARNED
+from hyuav.experiments.schemes import LEARNED, NO_HELPER
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.policy import learned_policy
 from hyuav.learning.weights import copy_weights, draw_weights
@@ -31,6 +31,7 @@ class FiveSchemes:
         draw_weights(loss, [work.seed], "weights")
         actor = learned_policy(scenario, algorithm, copy_weights(loss))
         straight, _ = straight_policies(scenario)
+        del straight[NO_HELPER]
         self.policies = {name: [actor] for name in LEARNED.values()} | straight
 
     def advance(self) -> int:

@@ -1,7 +1,8 @@
 """Do the main job: train the learned schemes, evaluate, draw.
 
 The schemes are Proposed, Re-OT and Ja-OT, each trained twice: by the robust variant of DDPG, and
-exactly as in the paper. Straight flights and the best possible ones are set beside them.
+exactly as in the paper; Proposed once more with the helper's power. Straight flights, no helper and
+the best possible flights are set beside them.
 
 hyuav reproduce
 hyuav reproduce scenario=random_disk training.num_episodes=600
@@ -47,7 +48,13 @@ from hyuav.experiments.evaluation_table import print_results
 from hyuav.experiments.initial_weights import select_initial_weights
 from hyuav.experiments.policies import Policies, learned_policies, references
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
-from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
+from hyuav.experiments.schemes import (
+    LABELS,
+    LEARNED_AS_IN_PAPER,
+    LEARNED_WITH_POWER,
+    PROPOSED_POWER,
+    SCHEMES,
+)
 from hyuav.experiments.tracking import LoggerParameters, log_evaluation, part_of
 from hyuav.experiments.train import train_or_resume
 from hyuav.learning.ddpg import DDPG
@@ -56,7 +63,7 @@ from hyuav.learning.training import TrainingParameters
 from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Preset, Scenario
 from hyuav.references.optimum import usable_resolution
-from hyuav.viz.data.runs import AS_IN_PAPER
+from hyuav.viz.data.runs import AS_IN_PAPER, WITH_POWER
 from hyuav.viz.html.page import write_report
 from hyuav.viz.paper.gallery import FigureName, draw
 
@@ -79,6 +86,8 @@ class Reproduce(Parameters):
     candidates: Annotated[int, Field(ge=1, le=1000)] = parameter(5)
     """Of each scheme's initial weights, where it is trained as in the paper."""
     candidate_episodes: Count = parameter(50)
+    power_episodes: Count = parameter(400)
+    """Of the training with the helper's power, at most."""
     seed: CountOrZero = parameter(0)
     reward: Text = parameter(SUM_RATE)
     """What a slot earns: a name, or FILE.py:NAME of a function or a transform."""
@@ -122,22 +131,27 @@ def reproduce(config: Config, directory: Path) -> None:
     as_in_paper = dataclasses.replace(own, algorithm_name="ddpg", algorithm=DDPG())
     weights = partial(_candidates, as_in_paper, options, console)
     paper_run = work.train(directory / AS_IN_PAPER, as_in_paper, weights)
-    paper = learned_policies([paper_run], scenario, LEARNED_AS_IN_PAPER)
-    evaluated = [(run.path, work.evaluate(run, scenario, run.path, paper), [run, paper_run])]
+    beside = learned_policies([paper_run], scenario, LEARNED_AS_IN_PAPER)
+    runs = [run, paper_run]
+    if (with_power := _with_power(own, options, console)) is not None:
+        power_run = work.train(directory / WITH_POWER, with_power)
+        beside |= learned_policies([power_run], with_power.scenario, LEARNED_WITH_POWER)
+        runs.append(power_run)
+    evaluated = [(run.path, work.evaluate(run, scenario, run.path, beside), runs)]
     for num_slots in others:
         over = dataclasses.replace(scenario, num_slots=num_slots)
         path = horizon_directory(run, num_slots)
         evaluated.append((path, work.evaluate(run, over, path), [run]))
     for configuration in further:
-        beside = work.train(directory / configuration.scenario_name, configuration)
-        evaluation = work.evaluate(beside, configuration.scenario, beside.path)
-        evaluated.append((beside.path, evaluation, [beside]))
+        trained = work.train(directory / configuration.scenario_name, configuration)
+        evaluation = work.evaluate(trained, configuration.scenario, trained.path)
+        evaluated.append((trained.path, evaluation, [trained]))
     draw(run, options.figures, console)
     paths = [run.path, *(run.path / own.scenario_name for own in further)]
     with make_progress(console, "reports") as progress:
         reports = [write_report(path) for path in progress.track(paths)]
-    for path, evaluation, trained in evaluated:
-        work.log(path, evaluation, trained)
+    for path, evaluation, flown in evaluated:
+        work.log(path, evaluation, flown)
     for path, evaluation, _ in evaluated:
         if path in paths:
             print_results(evaluation, console)
@@ -263,6 +277,25 @@ def _changed_alike(preset: Scenario, own: RunConfiguration) -> Scenario:
     begun = PRESETS.get(own.scenario_name, Scenario(ue_positions=flown.ue_positions)).to_dict()
     changes = {name: value for name, value in flown.to_dict().items() if value != begun[name]}
     return dataclasses.replace(preset, **{**changes, "ue_positions": preset.ue_positions})
+
+
+def _with_power(
+    own: RunConfiguration, options: Reproduce, console: Console
+) -> RunConfiguration | None:
+    """The same for the hybrid learners with the helper's power; None where that cannot be."""
+    if own.scenario.power_control:
+        return None
+    with_power = dataclasses.replace(
+        own,
+        scenario=SCHEMES[PROPOSED_POWER].flown_in(own.scenario),
+        learners=tuple(learner for learner in own.learners if learner.scheme == "hybrid"),
+    ).with_episodes(min(own.training.num_episodes, options.power_episodes))
+    try:
+        with_power.new_training()
+    except InputError as error:
+        print_line(f"{LABELS[PROPOSED_POWER]} is left out: {error}", console)
+        return None
+    return with_power
 
 
 def _candidates(

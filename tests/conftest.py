@@ -17,7 +17,7 @@ from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.references.flight import FlightPolicy
 from hyuav.references.optimum import solve_optimum
-from hyuav.references.straight import ja_lt, re_lt
+from hyuav.references.straight import ja_lt, no_helper, re_lt
 from recipe_calls import Call, Refusal, forget_own
 
 RECIPES = Path(__file__).parents[1] / "recipes"
@@ -64,12 +64,13 @@ def scenario() -> Scenario:
 
 @pytest.fixture(scope="session")
 def evaluation(scenario: Scenario) -> Evaluation:
-    """The straight flights and the optima; the hybrid optimum is flown as Proposed too."""
+    """The straight flights, no helper and the optima; the hybrid one is flown as Proposed too."""
     optima = solve_optimum(scenario, resolution=5.0)
     best = {rule: FlightPolicy(found.path, scenario) for rule, found in optima.items()}
     policies = {
         "re_lt": re_lt(scenario),
         "ja_lt": ja_lt(scenario),
+        "no_helper": no_helper(scenario),
         "proposed": best["hybrid"],
         "optimum": best["hybrid"],
         "re_optimum": best["relay"],

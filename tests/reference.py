@@ -229,6 +229,31 @@ def outcome(
     return Outcome(total, offloading, rate, taken, min(margins))
 
 
+def no_helper(
+    s: Scenario, helpers: Places, fading: Numbers | None, cycles: Numbers
+) -> tuple[float, float]:
+    """The sum-rate where everybody sends straight to L and nobody helps, and its margin.
+
+    ``helpers`` are where the helpers hover, which matters to nobody: they have draws in ``fading``.
+    """
+    g, rate, wants, margins = gains(s, helpers, fading), [], [], []
+    spent = s.ue_power * s.slot_duration / len(s.ue_positions)
+    for u, position in enumerate(s.ue_positions):
+        length = distance(position, s.legitimate_position)
+        heard = [s.ue_power * gain / s.noise_power for gain in g.g_ue[u]]
+        snr = sum(heard) if s.eavesdroppers == "colluding" else max(heard)
+        legitimate = math.log2(1 + s.ue_power * g.g_ul[u] / s.noise_power)
+        eavesdropper = math.log2(1 + snr)
+        rate.append(max(legitimate - eavesdropper, 0.0))
+        allowed = length <= s.coverage_radius and spent <= s.ue_energy_budget
+        wants.append(allowed and rate[u] > s.min_secrecy_rate)
+        excess = (rate[u] - s.min_secrecy_rate) / (1.0 + legitimate + eavesdropper)
+        margins += [abs(excess), abs(length - s.coverage_radius) / s.map_side]
+        margins.append(_relative(spent, s.ue_energy_budget))
+    offloading = _admitted(s, rate, wants, cycles, margins)
+    return sum(r for r, z in zip(rate, offloading, strict=True) if z), min(margins)
+
+
 def _admitted(
     s: Scenario, rate: list[float], wants: list[bool], cycles: Numbers, margins: list[float]
 ) -> list[bool]:

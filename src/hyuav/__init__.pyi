@@ -41,6 +41,7 @@ from hyuav.physics.slot import slot as slot
 from hyuav.references.flight import FlightPolicy as FlightPolicy
 from hyuav.references.optimum import solve_optimum as solve_optimum
 from hyuav.references.straight import ja_lt as ja_lt
+from hyuav.references.straight import no_helper as no_helper
 from hyuav.references.straight import re_lt as re_lt
 
 __all__: list[str]

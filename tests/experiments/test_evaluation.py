@@ -28,7 +28,7 @@ from hyuav.learning.policy import learned_policy
 from hyuav.learning.weights import copy_weights
 from hyuav.references.flight import FlightPolicy
 from hyuav.references.optimum import solve_optimum
-from hyuav.references.straight import ja_lt, re_lt
+from hyuav.references.straight import ja_lt, no_helper, re_lt
 
 SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=10)
 FEW = EvaluationParameters(episodes=40, flights=2, seed=5)
@@ -42,6 +42,7 @@ def policies() -> Policies:
     return {
         "re_lt": [re_lt(SCENARIO)],
         "ja_lt": [ja_lt(SCENARIO)],
+        "no_helper": [no_helper(SCENARIO)],
         "proposed": [learned_policy(SCENARIO, algorithm, weights, range(2))],
         **{
             OPTIMA[rule]: [FlightPolicy(optimum.path, SCENARIO)] for rule, optimum in optima.items()
@@ -71,6 +72,32 @@ def test_a_fixed_mode_scheme_is_measured_against_its_own_optimum_and_the_hybrid_
     jamming = schemes["ja_lt"]
     assert jamming["fraction_of_optimum"] == mean["ja_lt"] / mean["ja_optimum"]
     assert jamming["fraction_of_hybrid_optimum"] == mean["ja_lt"] / mean["optimum"]
+
+
+@pytest.mark.parametrize(
+    ("preset", "a_slot", "best_hybrid"),
+    [("random_disk", 18.5203, 60.183), ("two_clusters", 19.4288, 59.083)],
+)
+def test_without_a_helper_the_papers_presets_bring_six_times_the_best_hybrid_flight(
+    preset: str, a_slot: float, best_hybrid: float
+) -> None:
+    scenario = dataclasses.replace(Scenario.preset(preset), fading=False)
+    found = evaluate(scenario, preset, {"no_helper": no_helper(scenario)}, FEW).summary["schemes"]
+    mean = found["no_helper"]["secrecy_sum_rate"]["mean"]
+    assert mean == pytest.approx(20 * a_slot, abs=2e-3)
+    assert mean > 6 * best_hybrid
+    assert found["no_helper"]["helper_energy"] == 0.0
+
+
+def test_what_comes_without_a_helper_is_told_as_a_share_of_the_hybrid_optimum(
+    policies: Policies,
+) -> None:
+    beside = {"optimum": policies["optimum"], "no_helper": no_helper(SCENARIO)}
+    schemes = evaluate(SCENARIO, "two_clusters", beside, FEW).summary["schemes"]
+    mean = {name: result["secrecy_sum_rate"]["mean"] for name, result in schemes.items()}
+    alone = schemes["no_helper"]
+    assert alone["fraction_of_hybrid_optimum"] == mean["no_helper"] / mean["optimum"]
+    assert "fraction_of_optimum" not in alone
 
 
 def test_all_schemes_fly_through_the_same_fading() -> None:
@@ -281,3 +308,18 @@ def test_the_optimum_flies_with_the_power_that_was_chosen() -> None:
         mean = found[scheme]["secrecy_sum_rate"]["mean"]
         assert mean == pytest.approx(best[rule].value, rel=1e-4)
     assert found["optimum"]["secrecy_sum_rate"]["mean"] > found["re_lt"]["secrecy_sum_rate"]["mean"]
+
+
+def test_the_power_along_the_flight_is_kept_where_a_scheme_chooses_it() -> None:
+    controlled = dataclasses.replace(SCENARIO, power_control=True)
+    path = torch.tensor(SCENARIO.helper_starts).expand(SCENARIO.num_slots + 1, 1, 2)
+    share = torch.logspace(0.0, -6.0, SCENARIO.num_slots).unsqueeze(1)  # all of the range
+    flying = {
+        "re_lt": re_lt(SCENARIO),
+        "optimum_power": FlightPolicy(path, controlled, share),
+    }
+    found = evaluate(SCENARIO, "power", flying, FEW)
+    level = found.flights.groupby("scheme")["power_level"]
+    assert level.count().to_dict() == {"optimum_power": 2 * SCENARIO.num_slots, "re_lt": 0}
+    own = level.get_group("optimum_power").to_numpy()[: SCENARIO.num_slots]
+    np.testing.assert_allclose(own, np.linspace(0.0, -60.0, SCENARIO.num_slots), atol=1e-3)

@@ -5,22 +5,28 @@ import pandas as pd
 from rich.console import Console
 
 from hyuav.experiments.evaluation import Evaluation
-from hyuav.experiments.evaluation_table import print_results, upper_bounds
+from hyuav.experiments.evaluation_table import flight_cells, print_results, upper_bounds
+
+RESULT = {
+    "secrecy_sum_rate": {"mean": 59.824, "ci95": [59.661, 59.984]},
+    "fraction_of_hybrid_optimum": 0.9994,
+    "relay_share": 0.118,
+    "offloading_share": 0.79,
+    "off_map": 12.04,
+    "budget_violations": 0.0,
+}
 
 
-def printed(name: str = "square", reward: dict[str, str] | None = None, **more: Any) -> list[str]:
-    result = {
-        "secrecy_sum_rate": {"mean": 59.824, "ci95": [59.661, 59.984]},
-        "fraction_of_hybrid_optimum": 0.9994,
-        "relay_share": 0.118,
-        "offloading_share": 0.79,
-        "off_map": 12.04,
-        "budget_violations": 0.0,
-    }
-    schemes = {"proposed": result | more}
+def printed(
+    name: str = "square",
+    reward: dict[str, str] | None = None,
+    scheme: str = "proposed",
+    **more: Any,
+) -> list[str]:
+    schemes = {scheme: RESULT | more}
     summary = {"scenario": name, "num_slots": 20, "episodes": 1000, "schemes": schemes}
     if reward is not None:
-        schemes["proposed"]["reward"] = {"mean": 1390.85, "ci95": [1389.1, 1392.6]}
+        schemes[scheme]["reward"] = {"mean": 1390.85, "ci95": [1389.1, 1392.6]}
         summary["reward"] = reward
     file = io.StringIO()
     print_results(Evaluation(summary, pd.DataFrame()), Console(file=file, width=80))
@@ -62,10 +68,24 @@ def test_with_several_helpers_the_share_of_the_upper_bound_stands_beside_that_of
     assert max(map(len, lines)) <= 80
 
 
+def test_a_scheme_without_an_optimum_of_its_own_has_no_share_of_bounds() -> None:
+    assert flight_cells(RESULT, bounded=True)[1:3] == ("-", "-")
+
+
 def test_upper_bounds_are_told_below_the_table() -> None:
     result = {"upper_bound": 65.7}
     told = upper_bounds({"schemes": {"proposed": result, "optimum": result, "re_optimum": {}}})
     assert told == "no flight exceeds 65.70 (Optimum) bps/Hz"
+
+
+def test_more_than_a_hundred_and_more_than_ten_times_the_optimum_stay_within_80_columns() -> None:
+    rate = {"mean": 771.52, "ci95": [771.28, 771.81]}
+    more: dict[str, Any] = {"fraction_of_optimum": 1.0, "fraction_of_hybrid_optimum": 12.896}
+    lines = printed(secrecy_sum_rate=rate, **more, scheme="proposed_power")
+    row = next(line for line in lines if line.lstrip().startswith("Proposed, power"))
+    assert row.split()[2:7] == ["771.5", "[771.3,", "771.8]", "100.0", "%"]
+    assert row.split()[7:9] == ["1290", "%"]
+    assert max(map(len, lines)) <= 80
 
 
 def test_energy_budgets_that_are_exceeded_are_told() -> None:

@@ -59,7 +59,9 @@ def test_an_actor_earns_in_the_evaluation_what_it_earned_in_training(tmp_path: P
         assert best.loc[scheme, "best_evaluation"] == pytest.approx(expected, rel=0.1, abs=0.3)
 
 
-def test_the_references_of_a_scenario_are_two_straight_flights_and_three_optima() -> None:
-    assert set(references(ONE_OF_EACH.scenario, 5.0, SILENT).policies) == {
-        *("re_lt", "ja_lt", "optimum", "re_optimum", "ja_optimum")
-    }
+def test_the_references_are_two_straight_flights_no_helper_and_the_optima() -> None:
+    fixed = {"re_lt", "ja_lt", "no_helper", "optimum", "re_optimum", "ja_optimum"}
+    scenario = ONE_OF_EACH.scenario
+    assert set(references(scenario, 10.0, SILENT).policies) == {*fixed, "optimum_power"}
+    controlled = dataclasses.replace(scenario, power_control=True)
+    assert set(references(controlled, 20.0, SILENT).policies) == fixed

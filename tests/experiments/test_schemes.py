@@ -1,3 +1,6 @@
+import dataclasses
+
+from hyuav import Scenario
 from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, OPTIMA, SCHEMES
 from hyuav.physics.modes import MODE_RULES
 
@@ -13,4 +16,16 @@ def test_a_scheme_is_measured_against_the_optimum_of_its_mode_rule() -> None:
         **dict.fromkeys(("proposed", "proposed_paper", "optimum"), "optimum"),
         **dict.fromkeys(("ja_ot", "ja_ot_paper", "ja_lt", "ja_optimum"), "ja_optimum"),
         **dict.fromkeys(("re_ot", "re_ot_paper", "re_lt", "re_optimum"), "re_optimum"),
+        **dict.fromkeys(("proposed_power", "optimum_power"), "optimum_power"),
+        "no_helper": None,
     }
+
+
+def test_a_scheme_is_flown_in_the_scenario_but_for_what_it_changes() -> None:
+    scenario = Scenario.preset("random_disk")
+    for name in ("proposed", "re_lt", "optimum"):
+        assert SCHEMES[name].flown_in(scenario) == scenario
+    silent = SCHEMES["no_helper"].flown_in(scenario)
+    assert silent == dataclasses.replace(scenario, jamming_power=0.0)
+    controlled = SCHEMES["optimum_power"].flown_in(scenario)
+    assert controlled == dataclasses.replace(scenario, power_control=True)

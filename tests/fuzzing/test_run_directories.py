@@ -98,7 +98,7 @@ def show_evaluation(path: Path) -> None:
     if summary is not None:
         assert "<script" not in scheme_table(summary)
     index = RunIndex(path.parent.parent)
-    optima = index.optima(path.parent.name)
+    optima = index.references(path.parent.name)
     assert all(np.isfinite(value) for value in optima.values())
     parameters = (index.evaluation(path.parent.name) or {}).get("parameters")
     if isinstance(parameters, dict):
@@ -211,7 +211,7 @@ def use(run: RunDirectory) -> None:
     configuration = run.configuration()
     learned_policies([run], configuration.scenario)
     index.metrics(run.path.name)
-    index.optima(run.path.name)
+    index.references(run.path.name)
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from hyuav.experiments.run_directory import RunDirectory
+from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import PRESETS
 from hyuav.viz.paper.gallery import FIGURES
 from offline_wandb import history, offline_runs, recorded
@@ -38,7 +39,7 @@ def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
         *("animation.gif", "trajectories_nodes.csv", "flight_map_nodes.csv")
     }
     horizons = pd.read_csv(job / "figures" / "horizons.csv")
-    assert horizons.groupby("num_slots")["scheme"].count().to_dict() == {8: 8, 10: 8}
+    assert horizons.groupby("num_slots")["scheme"].count().to_dict() == {8: 10, 10: 10}
     proposed = horizons[horizons["scheme"] == "proposed"].set_index("num_slots")
     assert proposed["learners"].to_dict() == {8: 2, 10: 1}
     beside = RunDirectory(job / "random_disk")
@@ -58,9 +59,11 @@ def test_all_of_a_job_is_one_group_and_its_parts_are_named_after_it(
         "reproduce",
         *JOB,
         *("num_slots=10", "also=random_disk", "figures=learning_curves", "logger.mode=offline"),
+        "algorithm=ddpg",
     )
     job = tmp_path / "job"
-    places = (job, *(job / name for name in ("as_in_paper", "random_disk", "horizons/T10")))
+    parts = ("as_in_paper", "with_power", "random_disk", "horizons/T10")
+    places = (job, *(job / name for name in parts))
     files = [file for place in places for file in offline_runs(place)]
     runs = [recorded(file, "run")[0] for file in files]
     assert sorted((run.job_type, run.display_name) for run in runs) == [
@@ -70,6 +73,7 @@ def test_all_of_a_job_is_one_group_and_its_parts_are_named_after_it(
         ("train", "job"),
         ("train", "job/as_in_paper"),
         ("train", "job/random_disk"),
+        ("train", "job/with_power"),
     ]
     assert {run.run_group for run in runs} == {"job"}
     assert json.loads((job / "as_in_paper" / "wandb.json").read_text())["group"] == "job"
@@ -78,6 +82,21 @@ def test_all_of_a_job_is_one_group_and_its_parts_are_named_after_it(
         for file, run in zip(files, runs, strict=True)
         if run.job_type == "evaluate"
     )
+
+
+def test_the_helpers_power_is_learned_beside_the_papers_schemes(call: Call, tmp_path: Path) -> None:
+    call("reproduce", "algorithm=ddpg", *JOB, "figures=energy", "power_episodes=2")
+    with_power = RunDirectory(tmp_path / "job" / "with_power")
+    configuration = with_power.configuration()
+    assert configuration.scenario.power_control
+    assert {learner.scheme for learner in configuration.learners} == {"hybrid"}
+    assert configuration.training.num_episodes == 2
+    schemes = json.loads((tmp_path / "job" / "evaluation.json").read_text())["schemes"]
+    assert set(schemes) == set(LABELS)
+    own, best = (schemes[f"{name}_power"]["secrecy_sum_rate"] for name in ("proposed", "optimum"))
+    assert schemes["proposed_power"]["fraction_of_optimum"] == own["mean"] / best["mean"]
+    energy = pd.read_csv(tmp_path / "job" / "figures" / "energy.csv")
+    assert set(energy.dropna(subset="power_level")["scheme"]) == {"proposed_power"}
 
 
 @pytest.mark.parametrize("terminal", [True, False])
@@ -91,14 +110,14 @@ def test_a_terminal_shows_progress_of_all_that_takes_time_and_a_pipe_gets_none(
         for name, value in (("TTY_COMPATIBLE", "1"), ("TTY_INTERACTIVE", "1"), ("COLUMNS", "100")):
             monkeypatch.setenv(name, value)
     candidates = ("candidates=2", "candidate_episodes=3")
-    call("reproduce", *JOB, *candidates, "figures=[learning_curves,energy]")
+    call("reproduce", "algorithm=ddpg", *JOB, *candidates, "figures=[learning_curves,energy]")
     written = capsys.readouterr().out
     told = re.sub(r"\x1b\[[\d;?]*\w", "", written)
     for task, total in (
         ("initial weights", 3),
         ("training", 4),
         ("optima", 3),
-        ("evaluating", 11),
+        ("evaluating", 14),
         ("figures", 2),
         ("reports", 1),
     ):

@@ -91,7 +91,7 @@ def test_without_an_optimum_one_sentence_says_so(
     call("evaluate", f"run={run.relative_to(tmp_path)}", *FEW)
     assert "no optimum: a transform need not add up over slots" in capsys.readouterr().out
     schemes = summary(run)["schemes"]
-    assert set(schemes) == {"proposed", "re_lt", "ja_lt"} & set(schemes)
+    assert set(schemes) == {"proposed", "re_lt", "ja_lt", "no_helper"} & set(schemes)
     assert "fraction_of_optimum" not in schemes["proposed"]
     assert "bps/Hz" not in (run / "report.html").read_text().partition("Learning curves")[2][:400]
 

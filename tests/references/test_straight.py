@@ -2,9 +2,14 @@ import dataclasses
 
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+import reference
+import worlds
 from hyuav import InputError, Scenario, make_env
-from hyuav.references.straight import ja_lt, re_lt, relay_destination
+from hyuav.experiments.schemes import NO_HELPER, SCHEMES
+from hyuav.references.straight import ja_lt, no_helper, re_lt, relay_destination
 
 PRESETS = [Scenario.preset("random_disk"), Scenario.preset("two_clusters")]
 
@@ -52,3 +57,23 @@ def test_a_flight_beyond_the_helpers_energy_says_so() -> None:
     scenario = dataclasses.replace(PRESETS[0], helper_energy_budget=100.0)
     with pytest.raises(InputError, match="helper_energy_budget allows"):
         ja_lt(scenario)
+
+
+@settings(max_examples=15)
+@given(worlds.scenarios(several=True), st.booleans(), st.integers(0, 2**31))
+def test_without_a_helper_everybody_may_send_straight_for_the_whole_share(
+    scenario: Scenario, power_control: bool, seed: int
+) -> None:
+    scenario = dataclasses.replace(scenario, power_control=power_control)
+    own = SCHEMES[NO_HELPER]
+    env = make_env(own.flown_in(scenario), own.mode_rule, 3, seed=seed, diagnostics=True)
+    state = no_helper(scenario)(env.reset())
+    powers, cycles = reference.next_draws(env)
+    flown = env.step(state)["next"]
+    starts = scenario.helper_starts
+    torch.testing.assert_close(flown["position"], torch.tensor(starts).expand(3, -1, -1))
+    assert not flown["diagnostics", "helper_energy"].any()
+    for row in range(3):
+        expected, margin = reference.no_helper(scenario, starts, powers[row], cycles[row])
+        if margin > 1e-4:
+            assert flown["reward"][row].item() == pytest.approx(expected, rel=1e-4, abs=1e-4)

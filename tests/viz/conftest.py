@@ -5,6 +5,7 @@ import shutil
 from functools import partial
 from pathlib import Path
 
+import pandas as pd
 import pytest
 import torch
 from rich.console import Console
@@ -36,6 +37,16 @@ def relaying_and_jamming() -> tuple[Scenario, Evaluation]:
     parameters = EvaluationParameters(episodes=2, flights=1)
     flown = {"proposed": policy, "optimum": policy, "ja_lt": policy}
     return scenario, evaluate(scenario, "two", flown, parameters)
+
+
+@pytest.fixture
+def with_power(relaying_and_jamming: tuple[Scenario, Evaluation]) -> pd.DataFrame:
+    """Their flights, in which Proposed flies with -10, -20 and -30 dB, and with -1, -2 and -3."""
+    flights = relaying_and_jamming[1].flights.copy()
+    own = flights["scheme"] == "proposed"
+    for number, step in ((1, -10.0), (2, -1.0)):
+        flights[f"power_level_{number}"] = (step * flights["slot"]).where(own)
+    return flights
 
 
 @pytest.fixture(scope="session")

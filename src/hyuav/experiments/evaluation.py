@@ -187,13 +187,16 @@ def fly(
     """Fly all learners of a policy through the same episodes, with diagnostics.
 
     A :class:`hyuav.Policy` flies in the environment that it was trained in, but for the scenario
-    and who chooses the mode; any other in that of :func:`hyuav.make_env`.
+    and who chooses the mode; any other in that of :func:`hyuav.make_env`. The scenario is as
+    :meth:`.schemes.Scheme.flown_in` has it.
     """
+    own = SCHEMES[scheme]
     trained_in, learners = {}, 1
     if isinstance(policy, Policy):
         trained_in, learners = policy.environment, policy.learners
     seeds = [derived_seed(parameters.seed, "evaluation")] * learners
-    asked = {"scenario": scenario, "scheme": SCHEMES[scheme].mode_rule, "reward": reward}
+    flown_in = own.flown_in(scenario)
+    asked = {"scenario": flown_in, "scheme": own.mode_rule, "reward": reward}
     env = make_env(
         **{**trained_in, **asked},
         batch_size=(learners, parameters.episodes),
@@ -208,12 +211,15 @@ def fly(
         flown = env.step(module(state))
         found = _per_slot(flown["next"])
         if reward != DEFAULT:
-            own = flown["next", "reward"]
-            off_map = flown["next", "off_map"].sum(dim=-1, keepdim=True, dtype=own.dtype)
-            found["reward"] = (own + scenario.off_map_penalty * off_map).squeeze(-1)
+            earned = flown["next", "reward"]
+            off_map = flown["next", "off_map"].sum(dim=-1, keepdim=True, dtype=earned.dtype)
+            found["reward"] = (earned + scenario.off_map_penalty * off_map).squeeze(-1)
         for name, values in found.items():
             totals[name] = totals[name] + values if name in totals else values.double()
-        slots.append(flown["next"][0, : parameters.flights].cpu())
+        kept = flown["next"][0, : parameters.flights].cpu()
+        if flown_in.power_control:
+            kept["power_level"] = power_level(flown["action"][0, : parameters.flights], flown_in)
+        slots.append(kept)
         state = env.step_mdp(flown)
     return Flights(
         {name: values.cpu() for name, values in totals.items()}, torch.stack(slots, dim=1)
@@ -251,6 +257,12 @@ def _per_slot(after: TensorDictBase) -> dict[str, Tensor]:
     }
 
 
+def power_level(action: Tensor, scenario: Scenario) -> Tensor:
+    """The power of each helper in dB below the nominal one: (..., H), from actions (..., 3 H)."""
+    chosen = action.unflatten(-1, (scenario.num_helpers, -1))[..., 2].clamp(-1.0, 1.0)
+    return (scenario.power_range * (chosen - 1.0) / 2).cpu()
+
+
 def secrecy_sum_rate(flown: TensorDictBase) -> Tensor:
     """The secrecy sum-rate of a slot, without penalty: (...) bps/Hz."""
     return flown["diagnostics", "secrecy_rate"].sum(dim=-1)
@@ -261,19 +273,19 @@ def _returns(
 ) -> dict[str, Any]:
     """Mean returns with intervals, and as a fraction of the optima flown in the same draws."""
     returns = {name: flights.earned.numpy() for name, flights in flown.items()}
-    mean = float(returns[scheme].mean())
+    mean, best = float(returns[scheme].mean()), SCHEMES[scheme].optimum
     result: dict[str, Any] = {"learners": len(returns[scheme])}
     for name in RETURNS:
         if (own := flown[scheme].totals.get(name)) is not None:
             interval = confidence_interval(own.numpy())
             result[name] = {"mean": float(own.numpy().mean()), "ci95": interval}
     for field, optimum in (
-        ("fraction_of_optimum", SCHEMES[scheme].optimum),
+        ("fraction_of_optimum", best),
         ("fraction_of_hybrid_optimum", "optimum"),
     ):
         if optimum in returns and returns[optimum].mean() > 0:
             result[field] = mean / float(returns[optimum].mean())
-    if (bound := upper_bounds.get(SCHEMES[scheme].optimum)) is not None:
+    if best is not None and (bound := upper_bounds.get(best)) is not None:
         result["upper_bound"] = bound
         if bound > 0:
             result["fraction_of_upper_bound"] = mean / bound
@@ -311,7 +323,8 @@ def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
     """Flights (episodes, T) as a table with a row per slot; lists hold one entry per UE.
 
     With several helpers, whose numbers are columns ``x_1``, ``x_2`` and so on, :data:`WAY` tells
-    how each UE sends.
+    how each UE sends. Where their power is controlled, ``power_level`` is in dB relative to the
+    nominal one.
     """
     episodes, num_slots = flown.batch_size
     diagnostics = flown["diagnostics"]
@@ -330,6 +343,8 @@ def slot_table(scheme: str, flown: TensorDictBase) -> pd.DataFrame:
         **_of_helpers("helper_energy", diagnostics["helper_energy"]),
         "budget_violation": diagnostics["budget_violation"],
     }
+    if "power_level" in flown:
+        columns |= _of_helpers("power_level", flown["power_level"])
     table = pd.DataFrame(
         {
             name: values.flatten().numpy() if isinstance(values, Tensor) else values

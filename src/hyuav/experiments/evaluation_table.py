@@ -28,10 +28,10 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
     own = "of lower\nbound" if bounded else "own\noptimum"
     hybrid = "of upper\nbound" if bounded else "hybrid\noptimum"
     beside = "sum-rate\n(bps/Hz)" if "reward" in summary else hybrid
-    columns = own, beside, "relay\nslots", "UEs off-\nloading", "off\nmap"
+    columns = own, beside, "relay\nslots", "UEs\noff-\nloading", "off\nmap"
     table = results_table(title, "Scheme", earned, *columns)
     for scheme, result in summary["schemes"].items():
-        table.add_row(LABELS[scheme], *flight_cells(result))
+        table.add_row(LABELS[scheme], *flight_cells(result, bounded=bounded))
     print_table(table, console)
     if bounded:
         print_line(upper_bounds(summary), console)
@@ -66,30 +66,28 @@ def upper_bounds(summary: Mapping[str, Any]) -> str:
     return f"no flight exceeds {', '.join(told)} bps/Hz"
 
 
-def flight_cells(result: Mapping[str, Any]) -> tuple[str, ...]:
+def flight_cells(result: Mapping[str, Any], *, bounded: bool) -> tuple[str, ...]:
     """How a scheme flew, as text.
 
     Args:
         result: of the scheme, in the summary.
+        bounded: as :func:`is_bounded` tells of the summary.
 
     Returns:
         what it earned with its interval, the fraction of the scheme's own optimum, that of the
-        hybrid optimum or of the upper bound of the scheme's own or, where another reward was
-        earned, the secrecy sum-rate, the shares of relay slots and of UEs offloading, and the slots
-        off the map.
+        hybrid optimum or, where ``bounded``, of the upper bound of the scheme's own or, where
+        another reward was earned, the secrecy sum-rate, the shares of relay slots and of UEs
+        offloading, and the slots off the map. A fraction of what a scheme does not have is "-".
     """
     rate = result.get("reward", result["secrecy_sum_rate"])
     mean, (low, high) = rate["mean"], rate["ci95"]
-    digits = 1 if "reward" in result and abs(mean) >= 100.0 else 2
-    beside = "fraction_of_hybrid_optimum"
-    if "upper_bound" in result:
-        beside = "fraction_of_upper_bound"
+    digits = 1 if abs(mean) >= 100.0 else 2
+    share = result.get("fraction_of_upper_bound" if bounded else "fraction_of_hybrid_optimum")
+    beside = percent(share, 1 if share is None or share < 10.0 else 0)
     return (
         interval(mean, low, high, digits),
         percent(result.get("fraction_of_optimum")),
-        f"{result['secrecy_sum_rate']['mean']:.2f}"
-        if "reward" in result
-        else percent(result.get(beside)),
+        f"{result['secrecy_sum_rate']['mean']:.2f}" if "reward" in result else beside,
         percent(result["relay_share"]),
         percent(result["offloading_share"]),
         f"{result['off_map']:.1f}",

@@ -11,13 +11,23 @@ from hyuav._support.terminal import make_progress, print_line
 from hyuav.envs.reward import Reward
 from hyuav.envs.rewards import DEFAULT
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
+from hyuav.experiments.schemes import (
+    LABELS,
+    LEARNED,
+    NO_HELPER,
+    OPTIMA,
+    OPTIMUM_POWER,
+    SCHEMES,
+)
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
 from hyuav.references.flight import FlightPolicy
 from hyuav.references.objectives import why_no_optimum
-from hyuav.references.optimum import solve_optimum
-from hyuav.references.straight import ja_lt, re_lt
+from hyuav.references.optimum import RESOLUTION, solve_optimum
+from hyuav.references.straight import ja_lt, no_helper, re_lt
+
+POWER_RESOLUTION = 2.0
+"""Of the grid in m, at the finest, on which all powers are tried at each place."""
 
 Policies = dict[str, list[TensorDictModuleBase]]
 """By scheme."""
@@ -81,8 +91,11 @@ def learned_policies(
 
 
 def straight_policies(scenario: Scenario) -> tuple[Policies, list[str]]:
-    """Re-LT and Ja-LT, and a line for each that is too fast for the scenario and left out."""
-    policies: Policies = {}
+    """Re-LT, Ja-LT and no helper, and a line for each that is too fast for the scenario.
+
+    What is too fast is left out.
+    """
+    policies: Policies = {NO_HELPER: [no_helper(scenario)]}
     left_out = []
     for name, straight in {"re_lt": re_lt, "ja_lt": ja_lt}.items():
         try:
@@ -104,10 +117,11 @@ class References(NamedTuple):
 def references(
     scenario: Scenario, resolution: float | None, console: Console, reward: Reward = DEFAULT
 ) -> References:
-    """Re-LT, Ja-LT and the optimum of each mode rule, where there is one.
+    """Re-LT, Ja-LT, no helper, and the optimum of each mode rule, where there is one.
 
     Of one helper it is exact on a grid; of several it is the best flight that was found, and the
-    upper bound tells how much better another one may be.
+    upper bound tells how much better another one may be. One helper whose power is nominal is set
+    beside the hybrid optimum with chosen power, too.
 
     Args:
         scenario: to fly.
@@ -125,5 +139,12 @@ def references(
         optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
         policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario, optimum.share)]
+    if scenario.num_helpers == 1 and not scenario.power_control and reward == DEFAULT:
+        controlled = SCHEMES[OPTIMUM_POWER].flown_in(scenario)
+        spacing = max(resolution or RESOLUTION, POWER_RESOLUTION)
+        with make_progress(console, "optimum, power") as progress:
+            found = solve_optimum(controlled, ["hybrid"], resolution=spacing, track=progress.track)
+        best = found["hybrid"]
+        policies[OPTIMUM_POWER] = [FlightPolicy(best.path, controlled, best.share)]
     bounds = {OPTIMA[rule]: optimum.upper_bound for rule, optimum in optima.items()}
     return References(policies, {name: own for name, own in bounds.items() if own is not None})

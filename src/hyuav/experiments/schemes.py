@@ -1,7 +1,12 @@
 """The schemes that are compared, each a whole way to fly, and their names."""
 
-from dataclasses import dataclass
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
+
+from hyuav.physics.scenario import Scenario
 
 
 class Kind(Enum):
@@ -10,6 +15,7 @@ class Kind(Enum):
     LEARNED = "learned"
     LEARNED_AS_IN_PAPER = "learned by the paper's own algorithm, where another one is beside it"
     STRAIGHT = "a straight line"
+    NO_HELPER = "nobody flies"
     OPTIMUM = "the exact optimum"
 
 
@@ -24,11 +30,32 @@ class Scheme:
     mode_rule: str
     """Who chooses the mode in each slot: hybrid, relay or jamming."""
     kind: Kind
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    """Fields of the scenario that have other values where it is flown."""
 
     @property
-    def optimum(self) -> str:
-        """The scheme that it is measured against: the optimum with the same mode rule."""
-        return OPTIMA[self.mode_rule]
+    def optimum(self) -> str | None:
+        """The scheme that it is measured against: the optimum of the same mode rule and changes."""
+        own = [
+            other.name
+            for other in SCHEMES.values()
+            if other.kind is Kind.OPTIMUM
+            and (other.mode_rule, other.changes) == (self.mode_rule, self.changes)
+        ]
+        return own[0] if own else None
+
+    def flown_in(self, scenario: Scenario) -> Scenario:
+        """The scenario as it is where this scheme is flown."""
+        return dataclasses.replace(scenario, **self.changes)
+
+
+NO_HELPER = "no_helper"
+"""Everybody sends straight to L: as in jamming mode, by a helper that hovers and has no power."""
+
+PROPOSED_POWER, OPTIMUM_POWER = "proposed_power", "optimum_power"
+"""The helper's power is chosen in each slot, also where the scenario's is the nominal one."""
+
+_POWER = {"power_control": True}
 
 
 SCHEMES = {
@@ -40,11 +67,14 @@ SCHEMES = {
         Scheme("ja_ot_paper", "Paper Ja-OT", "jamming", Kind.LEARNED_AS_IN_PAPER),
         Scheme("re_ot", "Re-OT", "relay", Kind.LEARNED),
         Scheme("re_ot_paper", "Paper Re-OT", "relay", Kind.LEARNED_AS_IN_PAPER),
+        Scheme(PROPOSED_POWER, "Proposed, power", "hybrid", Kind.LEARNED, _POWER),
         Scheme("re_lt", "Re-LT", "relay", Kind.STRAIGHT),
         Scheme("ja_lt", "Ja-LT", "jamming", Kind.STRAIGHT),
+        Scheme(NO_HELPER, "No helper", "jamming", Kind.NO_HELPER, {"jamming_power": 0.0}),
         Scheme("optimum", "Optimum", "hybrid", Kind.OPTIMUM),
         Scheme("ja_optimum", "Ja-optimum", "jamming", Kind.OPTIMUM),
         Scheme("re_optimum", "Re-optimum", "relay", Kind.OPTIMUM),
+        Scheme(OPTIMUM_POWER, "Optimum, power", "hybrid", Kind.OPTIMUM, _POWER),
     )
 }
 """By name, in the order of the tables."""
@@ -54,7 +84,8 @@ LABELS = {name: scheme.label for name, scheme in SCHEMES.items()}
 
 
 def _by_mode_rule(kind: Kind) -> dict[str, str]:
-    return {own.mode_rule: own.name for own in SCHEMES.values() if own.kind is kind}
+    own = [scheme for scheme in SCHEMES.values() if scheme.kind is kind and not scheme.changes]
+    return {scheme.mode_rule: scheme.name for scheme in own}
 
 
 LEARNED = _by_mode_rule(Kind.LEARNED)
@@ -62,6 +93,9 @@ LEARNED = _by_mode_rule(Kind.LEARNED)
 
 LEARNED_AS_IN_PAPER = _by_mode_rule(Kind.LEARNED_AS_IN_PAPER)
 """The same by the paper's own algorithm, where another one is beside it."""
+
+LEARNED_WITH_POWER = {"hybrid": PROPOSED_POWER}
+"""The same where the helper's power is controlled, and is not in the scenario beside it."""
 
 OPTIMA = _by_mode_rule(Kind.OPTIMUM)
 """The optimum of each mode rule."""

@@ -1,4 +1,4 @@
-"""The reference schemes that fly a straight line: Re-LT and Ja-LT."""
+"""The references that fly straight lines, Re-LT and Ja-LT, and the one that does not fly."""
 
 import math
 from collections.abc import Sequence
@@ -86,3 +86,14 @@ def ja_lt(scenario: ScenarioLike) -> ConstantVelocity:
     """Jamming mode with a linear trajectory (Ja-LT), in a scenario or a preset of that name."""
     scenario = as_scenario(scenario)
     return ConstantVelocity(scenario, jamming_destinations(scenario), "jamming")
+
+
+def no_helper(scenario: ScenarioLike) -> ConstantVelocity:
+    """Nobody helps: the helpers stay where they start.
+
+    To be flown in jamming mode with ``jamming_power=0``, as the scheme ``no_helper`` of
+    :func:`hyuav.evaluate` is: then every covered UE may send straight to L for its whole share of
+    the slot, and nobody relays or jams.
+    """
+    scenario = as_scenario(scenario)
+    return ConstantVelocity(scenario, scenario.helper_starts, "jamming")

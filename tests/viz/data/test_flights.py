@@ -1,6 +1,7 @@
 import dataclasses
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from hyuav import InputError, Scenario
@@ -8,6 +9,7 @@ from hyuav.experiments.evaluation import Evaluation
 from hyuav.viz.data.flights import (
     energy_table,
     flight_tables,
+    flying_schemes,
     links,
     offloading_table,
     read_flight,
@@ -35,8 +37,8 @@ def test_the_energy_of_every_node_is_told_in_every_slot(
     scenario: Scenario, evaluation: Evaluation
 ) -> None:
     table = energy_table(scenario, evaluation.flights)
-    assert list(dict.fromkeys(table["scheme"])) == ["proposed", "re_lt", "ja_lt"]
-    assert len(table) == 3 * 10 * 12
+    assert list(dict.fromkeys(table["scheme"])) == ["proposed", "re_lt", "ja_lt", "no_helper"]
+    assert len(table) == 4 * 10 * 12
     own = table[table["scheme"] == "re_lt"]
     slots = read_flight(scenario, evaluation.flights, "re_lt").rows
     ues = own[own["node"].str.startswith("UE")]["energy"].to_numpy().reshape(10, 10)
@@ -50,7 +52,7 @@ def test_offloading_is_told_for_every_ue_and_slot(
     scenario: Scenario, evaluation: Evaluation
 ) -> None:
     table = offloading_table(scenario, evaluation.flights)
-    assert len(table) == 4 * 10 * 10
+    assert len(table) == 5 * 10 * 10
     own = table[table["scheme"] == "ja_lt"]
     assert not own["relay"].any()
     assert (own.loc[~own["offloading"], "secrecy_rate"] == 0.0).all()
@@ -102,6 +104,25 @@ def test_the_tables_tell_each_of_several_helpers_and_eavesdroppers(
     assert not offloading["relay_1"].any()
 
 
+def test_the_power_of_each_of_several_helpers_is_told(
+    relaying_and_jamming: tuple[Scenario, Evaluation], with_power: pd.DataFrame
+) -> None:
+    scenario, _ = relaying_and_jamming
+    flight = read_flight(scenario, with_power, "proposed")
+    assert flight.power_level is not None
+    assert flight.power_level.tolist() == [[-10.0, -1.0], [-20.0, -2.0], [-30.0, -3.0]]
+    assert flight.told_power(2) == [" at -30.0 dB", " at -3.0 dB"]
+    nominal = read_flight(scenario, with_power, "optimum")
+    assert nominal.power_level is None
+    assert nominal.told_power(2) == ["", ""]
+    path = flight_tables(scenario, with_power, ["proposed"])[""]
+    second = path[path["helper"] == 2]["power_level"].tolist()
+    assert second == [pytest.approx(np.nan, nan_ok=True), -1.0, -2.0, -3.0]
+    chosen = energy_table(scenario, with_power).dropna(subset="power_level")
+    assert set(chosen["scheme"]) == {"proposed"}
+    assert chosen.groupby("node")["power_level"].sum().to_dict() == {"H 1": -60.0, "H 2": -6.0}
+
+
 def test_flights_of_another_number_of_helpers_are_refused(
     relaying_and_jamming: tuple[Scenario, Evaluation],
 ) -> None:
@@ -121,3 +142,9 @@ def test_flights_of_another_number_of_helpers_are_refused(
 )
 def test_modes_are_told_in_words(relay: list[bool], told: str) -> None:
     assert told_modes(np.array(relay)) == told
+
+
+def test_whose_helper_flies_is_listed_in_the_order_of_the_tables(evaluation: Evaluation) -> None:
+    shuffled = evaluation.flights.sample(frac=1.0, random_state=0)
+    flying = ["proposed", "re_lt", "ja_lt", "optimum", "ja_optimum", "re_optimum"]
+    assert flying_schemes(shuffled) == flying

@@ -179,10 +179,10 @@ def test_no_symbolic_link_leads_out_of_the_directory(write: WriteRun, tmp_path: 
             read()
 
 
-def test_the_optima_of_an_evaluation_are_read(trained_runs: Path) -> None:
-    optima = RunIndex(trained_runs).optima("tiny")
-    assert set(optima) == {"hybrid", "relay", "jamming"}
-    assert optima["hybrid"] >= optima["relay"] > 0
+def test_the_references_of_an_evaluation_are_read(trained_runs: Path) -> None:
+    references = RunIndex(trained_runs).references("tiny")
+    assert set(references) == {"hybrid", "relay", "jamming", "no_helper"}
+    assert references["no_helper"] > references["hybrid"] >= references["relay"] > 0
 
 
 @pytest.mark.parametrize("content", ['{"schemes": {"optimum": 3}}', '{"schemes": {"optimum"'])
@@ -191,7 +191,7 @@ def test_a_damaged_or_foreign_evaluation_is_refused(
 ) -> None:
     file = write("run", 1) / "evaluation.json"
     index = RunIndex(tmp_path / "runs")
-    assert index.optima("run") == {}
+    assert index.references("run") == {}
     file.write_text(content)
     with pytest.raises(InputError, match=r"evaluation\.json: expected an evaluation in JSON"):
-        index.optima("run")
+        index.references("run")

@@ -21,6 +21,12 @@ def test_rates_stand_at_the_position_of_their_row_and_column() -> None:
     assert rates.rates["jamming"][-21, -21] == pytest.approx(2.714112, abs=1e-6)
 
 
+def test_what_comes_without_a_helper_stands_beside_the_map() -> None:
+    brings = helper_map(Scenario.preset("two_clusters"), 50.0)
+    assert brings.without_helper == pytest.approx(19.4288, abs=1e-4)
+    assert set(brings.table()["no_helper"]) == {brings.without_helper}
+
+
 def test_a_full_server_is_mapped_with_mean_tasks() -> None:
     scenario = dataclasses.replace(Scenario.preset("two_clusters"), edge_energy_budget=5.0)
     free = helper_map(Scenario.preset("two_clusters"), 20.0)

@@ -10,12 +10,12 @@ from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.data.reading import (
     is_drawable,
-    optima_of,
     read_evaluation,
     read_flights,
     readable_config,
     readable_evaluation,
     readable_flights,
+    references_of,
 )
 
 pytest_plugins = "sample_runs"
@@ -70,13 +70,16 @@ def test_what_is_missing_or_lacks_a_column_is_refused_in_a_line(
         read_flights(tmp_path)
 
 
-def test_each_mode_rule_has_its_optimum(evaluated: RunDirectory) -> None:
+def test_learners_are_set_beside_the_optimum_of_each_mode_rule_and_no_helper(
+    evaluated: RunDirectory,
+) -> None:
     content = read_evaluation(evaluated.path)
     best = {name: own["secrecy_sum_rate"]["mean"] for name, own in content["schemes"].items()}
-    assert optima_of(content) == {
+    assert references_of(content) == {
         "hybrid": best["optimum"],
         "jamming": best["ja_optimum"],
         "relay": best["re_optimum"],
+        "no_helper": best["no_helper"],
     }
 
 

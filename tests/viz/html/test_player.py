@@ -159,3 +159,34 @@ def test_the_player_moves_all_helpers_in_their_modes(
         assert [_segments(drawn[name]) for name in ("H → L, relays", "H → E, jams")] == [1, 1]
         (x, y) = (np.mean(drawn["coverage of H, relaying"][axis]) for axis in "xy")
         assert (x, y) == pytest.approx(scenario.helper_starts[1], abs=2.0)
+
+
+def test_the_power_of_each_of_several_helpers_is_told(
+    relaying_and_jamming: tuple[Scenario, Evaluation], with_power: pd.DataFrame
+) -> None:
+    scenario, _ = relaying_and_jamming
+    player = flight_player(scenario, with_power, "proposed")
+    told = "slot 2 of 3: H 1 jams at -20.0 dB, H 2 relays at -2.0 dB<"
+    assert told in player.frames[1].layout.title.text
+    powers = {trace.name: trace for trace in player.data if "power" in (trace.name or "")}
+    assert {name: trace.y for name, trace in powers.items()} == {
+        "power of H 1": (-10.0, -20.0, -30.0),
+        "power of H 2": (-1.0, -2.0, -3.0),
+    }
+    assert len({trace.line.dash for trace in powers.values()}) == 2
+
+
+def test_the_power_of_each_slot_is_told_where_it_is_chosen(
+    scenario: Scenario, flights: pd.DataFrame
+) -> None:
+    player = flight_player(scenario, flights, "optimum_power")
+    rows = flights[(flights["scheme"] == "optimum_power") & (flights["episode"] == 0)]
+    levels = rows.sort_values("slot")["power_level"].to_numpy()
+    (power,) = [trace for trace in player.data if trace.name == "power of H"]
+    np.testing.assert_allclose(power.y, levels, atol=0.01)
+    assert player.layout.yaxis5.overlaying == "y4"
+    for frame, level in zip(player.frames, levels, strict=True):
+        assert f" at {level:.1f} dB" in frame.layout.title.text
+    nominal = flight_player(scenario, flights, "optimum")
+    assert "power of H" not in {trace.name for trace in nominal.data}
+    assert " dB" not in nominal.layout.title.text

@@ -149,7 +149,7 @@ def test_an_unevaluated_run_is_flown_and_nothing_is_misplaced(
         assert page.locator("text=Nothing was evaluated yet").count() == 2
         page.locator(TITLE, has_text="Proposed, slot 1 of 12").wait_for()
         table = page.locator("section[aria-labelledby='schemes'] tbody th")
-        assert table.all_text_contents() == ["Proposed", "Re-OT", "Re-LT", "Ja-LT"]
+        assert table.all_text_contents() == ["Proposed", "Re-OT", "Re-LT", "Ja-LT", "No helper"]
 
 
 def test_hostile_names_stay_text(evaluated: RunDirectory, copied: Copy) -> None:

@@ -56,6 +56,9 @@ def test_each_horizon_has_its_optima_and_the_scenarios_own_comes_first(
     own = {shape.y0 for shape in picture.figures[names[0]].layout.shapes}
     assert len(own) == 2
     assert min(own) > min(drawn)
+    alone = best["no_helper"]["secrecy_sum_rate"]["mean"]
+    named = {trace.name for trace in picture.figures[names[1]].data}
+    assert f"No helper: {alone:.4g}" in named
 
 
 def test_each_horizon_has_a_table_and_flights(job: RunDirectory) -> None:
@@ -66,6 +69,7 @@ def test_each_horizon_has_a_table_and_flights(job: RunDirectory) -> None:
     names = list(picture.figures)
     assert {"T = 12: Proposed", "T = 12: Optimum", "T = 8: Optimum", "T = 8: Re-LT"} <= set(names)
     assert names[0] == "T = 12: Proposed"
+    assert not any("No helper" in name for name in names)
     assert len(picture.figures["T = 8: Optimum"].frames) == 8
 
 

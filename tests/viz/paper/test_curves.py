@@ -2,6 +2,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
+import pytest
 from matplotlib.colors import to_hex
 
 from hyuav.viz.data.curves import LearningCurve, learning_table
@@ -34,3 +35,19 @@ def test_each_training_has_a_panel_of_the_same_scale() -> None:
     first, second = learning_figure(pd.concat(tables)).axes
     assert (first.get_title(), second.get_title()) == ("by 1", "by 2")
     assert first.get_ylim() == second.get_ylim()
+
+
+@pytest.mark.parametrize(("alone", "drawn"), [(388.6, False), (50.0, True)])
+def test_what_comes_without_a_helper_is_a_number_where_a_line_would_squash_the_curves(
+    alone: float, drawn: bool
+) -> None:
+    curves = table({"proposed": RISING}, {"hybrid": 55.0})
+    curves.attrs["no_helper"] = alone
+    figure = learning_figure(curves)
+    (axes,) = figure.axes
+    lines = [line for line in axes.lines if set(np.atleast_1d(line.get_ydata())) == {alone}]
+    assert bool(lines) == drawn
+    (legend,) = figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert ("No helper" if drawn else "No helper: 388.6") in texts
+    assert axes.get_ylim()[1] < 70

@@ -1,4 +1,5 @@
 import numpy as np
+import pandas as pd
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
@@ -16,7 +17,10 @@ def test_the_flight_map_shows_every_scheme_that_was_flown(
     scenario: Scenario, evaluation: Evaluation
 ) -> None:
     figure = flight_map(scenario, evaluation.flights)
-    assert len(figure.axes) == len(FLIGHT_PANELS)
+    assert len(figure.axes) == len(FLIGHT_PANELS) - 1  # nobody has learned the helper's power
+    learned = evaluation.flights[evaluation.flights["scheme"] == "proposed"]
+    with_power = pd.concat([evaluation.flights, learned.assign(scheme="proposed_power")])
+    assert len(flight_map(scenario, with_power).axes) == len(FLIGHT_PANELS)
     assert {"Re-LT", "Ja-LT", "UE", "helper relays", "helper jams"} <= set(texts(figure))
     assert {"coverage of L", "start", "end"} <= set(texts(figure))
     assert "Re-OT" not in texts(figure)

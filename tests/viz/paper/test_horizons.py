@@ -19,14 +19,14 @@ def summaries(evaluation: Evaluation) -> list[dict[str, Any]]:
 
 
 def bars_of(figure: Figure) -> list[ErrorbarContainer]:
-    """The curves with intervals, in the order in which they were drawn."""
-    (axes,) = figure.axes
-    return [own for own in axes.containers if isinstance(own, ErrorbarContainer)]
+    """The curves with intervals, in the order in which they were drawn, those above first."""
+    drawn = [own for axes in figure.axes for own in axes.containers]
+    return [own for own in drawn if isinstance(own, ErrorbarContainer)]
 
 
 def test_the_table_has_a_row_for_each_scheme_and_horizon_in_order(evaluation: Evaluation) -> None:
     table = horizon_table(summaries(evaluation))
-    assert table["num_slots"].tolist() == [4] * 5 + [10] * 6
+    assert table["num_slots"].tolist() == [4] * 6 + [10] * 7
     assert table[table["scheme"] == "ja_lt"]["num_slots"].tolist() == [10]
     row = table[(table["scheme"] == "re_lt") & (table["num_slots"] == 10)].iloc[0]
     expected = evaluation.summary["schemes"]["re_lt"]["secrecy_sum_rate"]
@@ -40,7 +40,7 @@ def test_every_scheme_and_every_optimum_has_a_curve_with_intervals(
     figure = sum_rates_by_horizon(table)
     drawn = {str(own.get_label()): own for own in bars_of(figure)}
     optima = ["Optimum", "Ja-optimum", "Re-optimum"]
-    assert list(drawn) == [*optima, "Proposed", "Re-LT", "Ja-LT"]
+    assert list(drawn) == ["No helper", *optima, "Proposed", "Re-LT", "Ja-LT"]
     for label, scheme in (("Re-LT", "re_lt"), ("Ja-optimum", "ja_optimum")):
         line, _, (bars,) = drawn[label]
         own = table[table["scheme"] == scheme]
@@ -56,5 +56,22 @@ def test_every_scheme_and_every_optimum_has_a_curve_with_intervals(
 def test_no_bar_hides_another_and_all_stand_by_their_horizon(evaluation: Evaluation) -> None:
     figure = sum_rates_by_horizon(horizon_table(summaries(evaluation)))
     places = [np.asarray(own.lines[0].get_xdata(), dtype=float) for own in bars_of(figure)]
-    assert len({own[-1] for own in places}) == len(places)
+    assert len({own[-1] for own in places[1:]}) == len(places) - 1
+    assert places[0].tolist() == [4, 10]  # which has the upper axes for itself
     assert max(abs(own[-1] - 10) for own in places) < 1.0
+
+
+def test_no_helper_stands_above_a_break_where_it_would_squash_the_papers_schemes(
+    evaluation: Evaluation,
+) -> None:
+    table = horizon_table(summaries(evaluation))
+    upper, lower = sum_rates_by_horizon(table).axes
+    is_alone = table["scheme"] == "no_helper"
+    alone, others = table[is_alone]["mean"], table[~is_alone]["mean"]
+    assert upper.get_ylim()[0] < alone.min() <= alone.max() < upper.get_ylim()[1]
+    assert others.max() < lower.get_ylim()[1] < 2 * others.max()
+    poor = table.copy()
+    poor.loc[is_alone, ["mean", "low", "high"]] = others.max()
+    whole = sum_rates_by_horizon(poor)
+    assert len(whole.axes) == 1
+    assert "No helper" in {own.get_label() for own in bars_of(whole)}

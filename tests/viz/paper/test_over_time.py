@@ -1,4 +1,5 @@
 import numpy as np
+import pandas as pd
 
 from hyuav import Scenario
 from hyuav.experiments.evaluation import Evaluation
@@ -33,7 +34,7 @@ def test_the_offloading_figure_counts_ues_and_leaves_out_who_computes_itself(
     empty = np.ma.getmaskarray(np.ma.asarray(of_ues.images[0].get_array()))
     np.testing.assert_array_equal(empty, ~sent)
     counts = {str(line.get_label()): line.get_ydata() for line in of_counts.lines}
-    assert set(counts) == {"Proposed", "Re-LT", "Ja-LT"}
+    assert set(counts) == {"Proposed", "Re-LT", "Ja-LT", "No helper"}
     np.testing.assert_array_equal(counts["Proposed"], sent.sum(axis=0))
 
 
@@ -56,3 +57,31 @@ def test_each_of_several_helpers_has_its_energies_and_its_modes(
     assert told == ["Proposed, H 1", "Proposed, H 2", "Optimum, H 1", "Optimum, H 2"]
     modes = np.asarray(of_modes.images[0].get_array())
     assert modes.tolist() == [[1] * 3, [2] * 3] * 2  # jamming, relay
+
+
+def test_each_of_several_helpers_has_its_power(
+    relaying_and_jamming: tuple[Scenario, Evaluation], with_power: pd.DataFrame
+) -> None:
+    scenario, _ = relaying_and_jamming
+    of_nodes = energy_by_slot(energy_table(scenario, with_power)).axes[:6]
+    assert [axes.get_ylabel() for axes in of_nodes[4:]] == [
+        "Power of H 1 (dB)",
+        "Power of H 2 (dB)",
+    ]
+    (own,) = [line for line in of_nodes[5].lines if line.get_label() == "Proposed"]
+    assert np.asarray(own.get_ydata(orig=True)).tolist() == [-1.0, -2.0, -3.0]
+
+
+def test_the_power_is_drawn_where_a_scheme_chooses_it(
+    scenario: Scenario, evaluation: Evaluation
+) -> None:
+    rows = read_flight(scenario, evaluation.flights, "proposed").rows
+    level = np.linspace(-60.0, 0.0, len(rows))
+    chosen = rows.assign(scheme="proposed_power", power_level=level)
+    flights = pd.concat([evaluation.flights, chosen])
+    *_, of_power = energy_by_slot(energy_table(scenario, flights)).axes[:4]
+    assert of_power.get_ylabel() == "Power of H (dB)"
+    (own,) = [line for line in of_power.lines if line.get_label() == "Proposed, power"]
+    np.testing.assert_allclose(np.asarray(own.get_ydata(orig=True), dtype=float), level)
+    without = energy_by_slot(energy_table(scenario, evaluation.flights))
+    assert "Power of H (dB)" not in {axes.get_ylabel() for axes in without.axes}

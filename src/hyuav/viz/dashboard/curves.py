@@ -21,6 +21,7 @@ from hyuav.viz.data.curves import (
     quantities,
 )
 from hyuav.viz.data.schemes import mode_rule, scheme_color, scheme_label, scheme_line
+from hyuav.viz.html.curves import add_no_helper
 from hyuav.viz.html.style import DASHES, axis, base_layout, legend_below, plain
 
 X_AXES = {
@@ -69,7 +70,7 @@ class Choice:
 
 def comparison(
     metrics: Mapping[str, pd.DataFrame],
-    optima: Mapping[str, Mapping[str, float]],
+    references: Mapping[str, Mapping[str, float]],
     choice: Choice,
     unit: str = BPS,
 ) -> go.Figure:
@@ -81,7 +82,7 @@ def comparison(
 
     Args:
         metrics: by the run's name.
-        optima: of the runs for which they are known, by mode rule.
+        references: of the runs for which they are known, as :func:`.references_of`.
         choice: what is drawn.
         unit: of the rewards.
     """
@@ -97,7 +98,7 @@ def comparison(
             smooth = curve.smoothed(choice.smoothing)
             figure.add_traces(list(_traces(smooth, f"{label}{behind}", f"{run}/{label}", line)))
             rule = mode_rule(curve.scheme)
-            optimum = optima.get(run, {}).get(rule)
+            optimum = references.get(run, {}).get(rule)
             if optimum is not None and choice.y in RETURNS and not several_horizons:
                 figure.add_hline(
                     y=optimum,
@@ -105,6 +106,8 @@ def comparison(
                     name=_lines(f"{LABELS[OPTIMA[rule]]}{behind}"),
                     showlegend=True,
                 )
+        if choice.y in RETURNS and not several_horizons:
+            add_no_helper(figure, references.get(run, {}), behind, _lines)
     named = [trace for trace in figure.data if trace.showlegend is not False]
     figure.update_layout(
         **base_layout(),

@@ -10,7 +10,7 @@ from hyuav._support.errors import InputError
 from hyuav._support.formatting import percent
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.scenarios import named_scenario
-from hyuav.experiments.schemes import LEARNED, OPTIMA
+from hyuav.experiments.schemes import LEARNED, NO_HELPER, OPTIMA
 from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.viz.dashboard import draft as drafts
@@ -18,6 +18,7 @@ from hyuav.viz.dashboard.draft_widgets import editor, place
 from hyuav.viz.dashboard.flights_page import player
 from hyuav.viz.dashboard.overlay import QUANTITIES, add_flights, explorer_map
 from hyuav.viz.dashboard.plain import ensure_offered, plain, refusals
+from hyuav.viz.data.flights import flying_schemes
 from hyuav.viz.data.flying import (
     COARSE_DRAWS,
     EPISODES,
@@ -227,19 +228,22 @@ def _is_refined(scenario: Scenario, rule: str) -> bool:
 def _tell(evaluation: Evaluation, rule: str) -> None:
     """What the flights bring on average, the optimum first."""
     schemes = evaluation.summary["schemes"]
-    shown = [name for name in (OPTIMA[rule], LEARNED[rule]) if name in schemes]
-    for column, name in zip(st.columns(2), shown, strict=False):
+    shown = [name for name in (OPTIMA[rule], LEARNED[rule], NO_HELPER) if name in schemes]
+    best = schemes[OPTIMA[rule]]["secrecy_sum_rate"]["mean"]
+    for column, name in zip(st.columns(3), shown, strict=False):
         result = schemes[name]
-        share = result.get("fraction_of_optimum", 1.0)
+        mean = result["secrecy_sum_rate"]["mean"]
+        beside = name != OPTIMA[rule] and best > 0.0
         column.metric(
             scheme_label(name),
-            f"{result['secrecy_sum_rate']['mean']:.2f} bps/Hz",
-            None if name == OPTIMA[rule] else f"{percent(share)} of the optimum",
+            f"{mean:.2f} bps/Hz",
+            f"{percent(mean / best)} of the optimum" if beside else None,
             delta_color="off",
             border=True,
         )
+        relaying = f"{percent(result['relay_share'], 0)} of the slots relay, "
         column.caption(
-            f"{percent(result['relay_share'], 0)} of the slots relay, "
+            f"{'' if name == NO_HELPER else relaying}"
             f"{percent(result['offloading_share'], 0)} of the UEs offload"
         )
 
@@ -279,7 +283,7 @@ def _play(scenario: Scenario, evaluation: Evaluation) -> None:
     """A flight slot by slot, where it is wanted."""
     if not st.toggle("Play a flight slot by slot", key="play"):
         return
-    schemes = list(evaluation.summary["schemes"])
+    schemes = flying_schemes(evaluation.flights)
     ensure_offered("played", schemes)
     scheme = st.selectbox("Flight of", schemes, format_func=scheme_label, key="played")
     with refusals():

@@ -11,6 +11,7 @@ from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import FLIGHTS_FILE
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.dashboard.plain import ensure_offered, plain, refusals
+from hyuav.viz.data.flights import flying_schemes
 from hyuav.viz.data.flying import checkpoint_of, flown_by, learner_label
 from hyuav.viz.data.index import RunIndex, Stamp
 from hyuav.viz.data.reading import read_flights
@@ -115,7 +116,7 @@ def _flown_now(index: RunIndex, name: str) -> tuple[Scenario, pd.DataFrame]:
 
 
 def _play(scenario: Scenario, flights: pd.DataFrame) -> None:
-    schemes = list(dict.fromkeys(flights["scheme"].astype(str)))
+    schemes = flying_schemes(flights)
     ensure_offered("flown_scheme", schemes)
     first, second = st.columns([2, 1])
     scheme = first.selectbox("Scheme", schemes, format_func=scheme_label, key="flown_scheme")

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from hyuav.envs.rendering import HELPER_COLOR, runs_of_one_mode
 from hyuav.physics.scenario import Scenario
-from hyuav.viz.data.flights import Flight, first_flights
+from hyuav.viz.data.flights import Flight, first_flights, flying_schemes
 from hyuav.viz.data.maps import RULE_MODES, helper_map
 from hyuav.viz.data.schemes import scheme_color, scheme_label
 from hyuav.viz.html.maps import map_figure
@@ -71,7 +71,7 @@ def add_flights(figure: go.Figure, scenario: Scenario, flights: pd.DataFrame) ->
         flights: a row per slot, as in :attr:`hyuav.experiments.evaluation.Evaluation.flights`.
     """
     map_and_nodes = len(figure.data)
-    for flight in first_flights(scenario, flights, flights["scheme"]).values():
+    for flight in first_flights(scenario, flights, flying_schemes(flights)).values():
         figure.add_traces(list(_flight(flight)))
     figure.for_each_trace(_stay_bright, selector={"type": "scatter"})
     drawn = figure.data[:map_and_nodes]

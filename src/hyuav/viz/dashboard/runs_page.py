@@ -178,12 +178,12 @@ def _progress(entry: RunEntry, now: float) -> None:
 def _drawn(index: RunIndex, metrics: Mapping[str, pd.DataFrame], unit: str) -> None:
     """The figure with its controls, and the tables below it."""
     choice = _choice(metrics, unit)
-    optima: dict[str, Mapping[str, float]] = {}
+    references: dict[str, Mapping[str, float]] = {}
     with st.container():
         for name in metrics:
             with refusals():
-                optima[name] = index.optima(name)
-    figure = _figure(metrics, optima, choice, unit)
+                references[name] = index.references(name)
+    figure = _figure(metrics, references, choice, unit)
     if not figure.data:
         st.info("No episode of this quantity is complete yet.")
         return
@@ -213,7 +213,7 @@ class _Shown(NamedTuple):
 
 def _figure(
     metrics: Mapping[str, pd.DataFrame],
-    optima: Mapping[str, Mapping[str, float]],
+    references: Mapping[str, Mapping[str, float]],
     choice: Choice,
     unit: str,
 ) -> go.Figure:
@@ -222,9 +222,9 @@ def _figure(
     Metrics without new rows are the same table as before.
     """
     shown: _Shown | None = st.session_state.get("shown")
-    made_of = optima, choice, unit, [(name, id(rows)) for name, rows in metrics.items()]
+    made_of = references, choice, unit, [(name, id(rows)) for name, rows in metrics.items()]
     if shown is None or shown.made_of != made_of:
-        shown = _Shown(comparison(metrics, optima, choice, unit), metrics, made_of)
+        shown = _Shown(comparison(metrics, references, choice, unit), metrics, made_of)
         st.session_state["shown"] = shown
     return shown.figure
 

@@ -117,13 +117,13 @@ def learning_curves(
 
 
 def learning_table(
-    curves: Iterable[LearningCurve], optima: Mapping[str, float], training: str = ""
+    curves: Iterable[LearningCurve], references: Mapping[str, float], training: str = ""
 ) -> pd.DataFrame:
     """The interquartile mean of what the learners of each scheme earn, episode by episode.
 
     Args:
         curves: one for each scheme.
-        optima: by mode rule, what the best flight earns on average.
+        references: as :func:`.references_of`.
         training: what the training is called.
 
     Returns:
@@ -143,7 +143,7 @@ def learning_table(
             "iqm": smooth.middle(),
             "low": low,
             "high": high,
-            "optimum": optima.get(mode_rule(curve.scheme), np.nan),
+            "optimum": references.get(mode_rule(curve.scheme), np.nan),
         }
         tables.append(pd.DataFrame(columns))
     return pd.concat(tables, ignore_index=True)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from hyuav._support.errors import InputError, rejection
 from hyuav.experiments.evaluation import PER_UE, WAY, helper_columns
+from hyuav.experiments.schemes import NO_HELPER
 from hyuav.physics.scenario import Point, Scenario
-from hyuav.viz.data.schemes import COMPARED
+from hyuav.viz.data.schemes import DRAWN, scheme_place
 
 MODE_ROWS = ("proposed", "optimum")
 """The schemes whose helper chooses its mode."""
@@ -37,6 +38,8 @@ class Flight(NamedTuple):
     """How a UE sends if it offloads, 0 straight to L and i through helper i: (T, U)."""
     rows: pd.DataFrame
     """As they were read, a row per slot."""
+    power_level: NDArray[np.float64] | None
+    """Of each helper, in dB relative to its mode's nominal power: (T, H); None where all are."""
 
     @property
     def num_slots(self) -> int:
@@ -46,6 +49,12 @@ class Flight(NamedTuple):
     def helpers(self, slot: int) -> list[Point]:
         """Where the helpers are after so many slots, in m."""
         return [(float(x), float(y)) for x, y in self.path[slot]]
+
+    def told_power(self, slot: int) -> list[str]:
+        """Of each helper in a slot, counted from 0: " at -3.0 dB", or nothing where nominal."""
+        if self.power_level is None:
+            return [""] * self.relay.shape[1]
+        return [f" at {level:.1f} dB" for level in self.power_level[slot]]
 
     @property
     def off_map(self) -> NDArray[np.bool_]:
@@ -58,13 +67,16 @@ def names(letter: str, count: int) -> list[str]:
     return [letter] if count == 1 else [f"{letter} {number}" for number in range(1, count + 1)]
 
 
-def told_modes(relay: NDArray[np.bool_]) -> str:
-    """What each helper does in a slot, (H,): "the helper jams", or "H 1 relays, H 2 jams"."""
+def told_modes(relay: NDArray[np.bool_], power: Sequence[str] | None = None) -> str:
+    """What each helper does in a slot, (H,): "the helper jams", or "H 1 relays, H 2 jams".
+
+    Behind it stands its power, as :meth:`Flight.told_power` gives it.
+    """
     if len(relay) > 3:  # too many for a title
         return f"{int(relay.sum())} of {len(relay)} helpers relay"
     who = ["the helper"] if len(relay) == 1 else names("H", len(relay))
-    verbs = ["relays" if own else "jams" for own in relay]
-    return ", ".join(map(" ".join, zip(who, verbs, strict=True)))
+    told = zip(who, relay, power or [""] * len(relay), strict=True)
+    return ", ".join(f"{name} {'relays' if own else 'jams'}{level}" for name, own, level in told)
 
 
 def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode: int = 0) -> Flight:
@@ -94,6 +106,8 @@ def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode:
     helper_energy = rows[columns("helper_energy")].to_numpy(float)
     of_ues = np.array(lists["ue_energy"], dtype=float)
     offloading = np.array(lists["offloading"], dtype=bool)
+    told = set(columns("power_level")) <= set(rows)
+    level = rows[columns("power_level")].to_numpy(float) if told else None
     return Flight(
         scheme,
         np.concatenate([np.array([scenario.helper_starts]), places]),
@@ -103,6 +117,7 @@ def read_flight(scenario: Scenario, flights: pd.DataFrame, scheme: str, episode:
         np.hstack([of_ues, rows[["edge_energy"]].to_numpy(float), helper_energy]),
         np.array(list(rows[WAY])) if WAY in rows else relay * np.ones_like(offloading, dtype=int),
         rows,
+        level if level is not None and np.isfinite(level).all() else None,
     )
 
 
@@ -156,6 +171,16 @@ def links(scenario: Scenario, flight: Flight, slot: int) -> Links:
     )
 
 
+def flying_schemes(flights: pd.DataFrame) -> list[str]:
+    """The schemes in which a helper flies, in the order of every table.
+
+    Args:
+        flights: a row per slot, as in :attr:`hyuav.experiments.evaluation.Evaluation.flights`.
+    """
+    flown = dict.fromkeys(flights["scheme"].astype(str))
+    return sorted((scheme for scheme in flown if scheme != NO_HELPER), key=scheme_place)
+
+
 def first_flights(
     scenario: Scenario, flights: pd.DataFrame, schemes: Iterable[str]
 ) -> dict[str, Flight]:
@@ -196,20 +221,23 @@ def flight_tables(
 
     Returns:
         "", the flights: ``scheme``, ``slot`` (0 is the start), ``x`` and ``y`` in m, and whether
-        the helper does ``relay``; of several helpers a row for each ``helper``, from 1. "nodes":
+        the helper does ``relay``, with its ``power_level`` in dB where that is controlled; of
+        several helpers a row for each ``helper``, from 1. "nodes":
         each ``node`` with its ``x`` and ``y`` in m and the ``coverage`` radius in m of L.
     """
     paths = []
     for scheme, flight in first_flights(scenario, flights, schemes).items():
-        for number in range(1, scenario.num_helpers + 1):
+        for number in range(scenario.num_helpers):
             columns = {
                 "scheme": scheme,
                 "slot": range(flight.num_slots + 1),
-                **({"helper": number} if scenario.num_helpers > 1 else {}),
-                "x": flight.path[:, number - 1, 0],
-                "y": flight.path[:, number - 1, 1],
-                "relay": [None, *flight.relay[:, number - 1].tolist()],
+                **({"helper": number + 1} if scenario.num_helpers > 1 else {}),
+                "x": flight.path[:, number, 0],
+                "y": flight.path[:, number, 1],
+                "relay": [None, *flight.relay[:, number].tolist()],
             }
+            if flight.power_level is not None:
+                columns["power_level"] = [np.nan, *flight.power_level[:, number].tolist()]
             paths.append(pd.DataFrame(columns))
     places = {f"UE {ue}": place for ue, place in enumerate(scenario.ue_positions, start=1)}
     eavesdroppers = names("E", scenario.num_eavesdroppers)
@@ -229,18 +257,22 @@ def energy_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
         flights: a row per slot, as in :attr:`Evaluation.flights`.
 
     Returns:
-        ``scheme``, ``slot``, ``node`` (as in :func:`budgets`), ``energy`` and ``budget`` in J. L
-        spends in a slot what the tasks taken in the slot before need.
+        ``scheme``, ``slot``, ``node`` (as in :func:`budgets`), ``energy`` and ``budget`` in J, and
+        the ``power_level`` of a helper in dB where that is controlled. L spends in a slot what the
+        tasks taken in the slot before need.
     """
     budget = budgets(scenario)
     tables = []
-    for flight in first_flights(scenario, flights, COMPARED).values():
+    for flight in first_flights(scenario, flights, DRAWN).values():
         columns = {
             **_slots(flight, len(budget)),
             "node": list(budget) * flight.num_slots,
             "energy": flight.energy.flatten(),
             "budget": list(budget.values()) * flight.num_slots,
         }
+        if flight.power_level is not None:
+            of_others = np.full((flight.num_slots, scenario.num_ues + 1), np.nan)
+            columns["power_level"] = np.hstack([of_others, flight.power_level]).flatten()
         tables.append(pd.DataFrame(columns))
     return pd.concat(tables, ignore_index=True)
 
@@ -258,7 +290,7 @@ def offloading_table(scenario: Scenario, flights: pd.DataFrame) -> pd.DataFrame:
     """
     relays = helper_columns("relay", scenario.num_helpers)
     num_ues, tables = scenario.num_ues, []
-    for flight in first_flights(scenario, flights, (*COMPARED, *MODE_ROWS)).values():
+    for flight in first_flights(scenario, flights, (*DRAWN, *MODE_ROWS)).values():
         columns = {
             **_slots(flight, num_ues),
             **dict(zip(relays, flight.relay.repeat(num_ues, axis=0).T, strict=True)),

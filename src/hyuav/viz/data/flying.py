@@ -15,12 +15,13 @@ from hyuav.experiments.policies import (
     straight_policies,
 )
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
-from hyuav.experiments.schemes import LABELS, LEARNED, OPTIMA
+from hyuav.experiments.schemes import LABELS, LEARNED, NO_HELPER, OPTIMA
 from hyuav.learning.learners import Learner
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
 from hyuav.references.flight import FlightPolicy
 from hyuav.references.optimum import RESOLUTION, Optimum, solve_optimum
+from hyuav.references.straight import no_helper
 from hyuav.viz.data.index import RunIndex, Stamp
 
 MOST_SLOTS, MOST_UES, MOST_HELPERS = 500, 200, 3
@@ -122,7 +123,7 @@ def optimum(scenario: Scenario, rule: str, *, fine: bool) -> Optimum:
 def flown(
     scenario: Scenario, rule: str, checkpoint: Checkpoint | None = None, *, fine: bool = False
 ) -> Evaluation:
-    """Fly the optimum and, beside it, a checkpoint through the same fading.
+    """Fly the optimum and, beside it, no helper and a checkpoint through the same fading.
 
     Args:
         scenario: to fly.
@@ -135,6 +136,7 @@ def flown(
     """
     best = optimum(scenario, rule, fine=fine)
     policies: Policies = {OPTIMA[rule]: [FlightPolicy(best.path, scenario, best.share)]}
+    policies[NO_HELPER] = [no_helper(scenario)]
     if checkpoint is not None:
         policies[LEARNED[rule]] = [_policy(scenario, checkpoint)]
     bounds = {} if best.upper_bound is None else {OPTIMA[rule]: best.upper_bound}

@@ -15,7 +15,7 @@ from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE
 from hyuav.experiments.metrics import GrowingMetrics, last_metrics
 from hyuav.experiments.regimes.work import REGIMES_FILE
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.viz.data.reading import optima_of, read_evaluation, readable_config, unit_of
+from hyuav.viz.data.reading import read_evaluation, readable_config, references_of, unit_of
 
 RUNNING_SECONDS = 120.0
 """A training that wrote nothing for longer counts as stopped."""
@@ -193,14 +193,14 @@ class RunIndex:
             return None
         return read_evaluation(self.file(name, EVALUATION_FILE).parent)
 
-    def optima(self, name: str) -> dict[str, float]:
-        """What the best flight earns by mode rule, where it was evaluated.
+    def references(self, name: str) -> dict[str, float]:
+        """What the run's learners are set beside, as :func:`.references_of`.
 
         Raises:
             InputError: as :meth:`evaluation`.
         """
         evaluation = self.evaluation(name)
-        return {} if evaluation is None else optima_of(evaluation)
+        return {} if evaluation is None else references_of(evaluation)
 
     def metrics(self, name: str) -> pd.DataFrame:
         """A run's metrics as far as they are written.

@@ -8,6 +8,7 @@ import pandas as pd
 import torch
 from numpy.typing import NDArray
 
+from hyuav.experiments.schemes import NO_HELPER, SCHEMES
 from hyuav.physics.outcome import Control
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics, slot
@@ -29,14 +30,18 @@ class HelperMap(NamedTuple):
     """The secrecy sum-rates in each mode, C_1 of relaying and C_0 of jamming: (N, N) bps/Hz."""
     offloading: dict[Mode, NDArray[np.int64]]
     """How many UEs offload in each mode: (N, N)."""
+    without_helper: float
+    """The secrecy sum-rate where everybody sends straight to L and nobody helps, in bps/Hz."""
 
     def table(self) -> pd.DataFrame:
         """Row by row from the south-west: ``x`` and ``y`` in m, and the sum-rates in bps/Hz.
 
-        These are ``relay``, ``jamming``, and the ``better`` of both.
+        These are ``relay``, ``jamming``, the ``better`` of both, and everywhere the same without a
+        helper, ``no_helper``.
         """
         x, y = np.meshgrid(self.axis, self.axis)
-        columns = [("x", x), ("y", y), *self.rates.items()]
+        alone = np.full_like(x, self.without_helper)
+        columns = [("x", x), ("y", y), *self.rates.items(), (NO_HELPER, alone)]
         return pd.DataFrame({name: values.ravel() for name, values in columns})
 
 
@@ -62,8 +67,12 @@ def helper_map(scenario: Scenario, resolution: float = 1.0) -> HelperMap:
     relaying, jammed = (mode.offloading.expand(*x.shape, -1).sum(dim=-1) for mode in modes)
     chosen = torch.where(relay > jamming, relaying, jammed)
     better = torch.maximum(relay, jamming)
+    silent = Physics(SCHEMES[NO_HELPER].flown_in(scenario), dtype=torch.float64)
+    staying = Control(torch.zeros_like(silent.nodes.helper))
+    alone = slot(silent, silent.nodes, staying, tasks=mean_tasks(scenario, torch.float64)).jamming
     return HelperMap(
         axis.numpy(),
         {"relay": relay.numpy(), "jamming": jamming.numpy(), "better": better.numpy()},
         {"relay": relaying.numpy(), "jamming": jammed.numpy(), "better": chosen.numpy()},
+        float(alone.sum_rate),
     )

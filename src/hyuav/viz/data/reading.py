@@ -20,7 +20,7 @@ from hyuav.experiments.evaluation import (
     WAY,
     helper_columns,
 )
-from hyuav.experiments.schemes import LABELS, OPTIMA
+from hyuav.experiments.schemes import LABELS, NO_HELPER, OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import num_helpers
 
@@ -110,13 +110,17 @@ def unit_of(config: Mapping[str, Any]) -> str:
     return "" if known is None else known.unit
 
 
-def optima_of(evaluation: Mapping[str, Any]) -> dict[str, float]:
-    """By mode rule, what the best flight earns by the reward, where it was evaluated."""
+def references_of(evaluation: Mapping[str, Any]) -> dict[str, float]:
+    """What learners are set beside, by the reward, as far as it was evaluated.
+
+    Returns:
+        what the best flight earns by mode rule, and under :data:`NO_HELPER` what comes without one.
+    """
     results = evaluation["schemes"]
     return {
-        rule: float(earned(results[optimum])["mean"])
-        for rule, optimum in OPTIMA.items()
-        if optimum in results
+        name: float(earned(results[scheme])["mean"])
+        for name, scheme in {**OPTIMA, NO_HELPER: NO_HELPER}.items()
+        if scheme in results
     }
 
 

@@ -16,22 +16,25 @@ from hyuav.experiments.evaluation_table import earned_title
 from hyuav.experiments.metrics import readable_metrics
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.scenarios import named_scenario
-from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, OPTIMA
+from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, NO_HELPER
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import learning_curves, learning_table
 from hyuav.viz.data.reading import (
     earned,
     is_drawable,
-    optima_of,
     read_evaluation,
     read_flights,
     readable_evaluation,
     readable_flights,
+    references_of,
 )
-from hyuav.viz.data.schemes import COMPARED
+from hyuav.viz.data.schemes import BEST, DRAWN
 
 AS_IN_PAPER = "as_in_paper"
 """Directory of the paper's own algorithm within a main job's run."""
+
+WITH_POWER = "with_power"
+"""The same of the training with the helper's power."""
 
 
 def evaluation_directories(directory: Path) -> list[Path]:
@@ -111,11 +114,12 @@ class FinishedRun:
             own = metrics[metrics["num_slots"] == self.scenario.num_slots]
             curves = list(learning_curves(own[own["scheme"].isin(LEARNED)]))
             if curves:
-                tables.append(learning_table(curves, self._optima(), training))
+                tables.append(learning_table(curves, self._references(), training))
         if not tables:
             raise InputError(f"no learner has the scenario's T = {self.scenario.num_slots}")
         table = pd.concat(tables, ignore_index=True)
         table.attrs["unit"] = self._unit
+        table.attrs[NO_HELPER] = self._references().get(NO_HELPER)
         return table
 
     def _trainings(self) -> dict[str, RunDirectory]:
@@ -126,12 +130,12 @@ class FinishedRun:
             trainings[f"{label(paper.configuration().algorithm_name)}, as in the paper"] = paper
         return trainings
 
-    def _optima(self) -> dict[str, float]:
-        """Over the scenario's horizon, by mode rule: empty where that was not evaluated."""
+    def _references(self) -> dict[str, float]:
+        """Over the scenario's horizon: empty where that was not evaluated."""
         if not _is_evaluated(self.run.path):
             return {}
         is_own = self.summary["num_slots"] == self.scenario.num_slots
-        return optima_of(self.summary) if is_own else {}
+        return references_of(self.summary) if is_own else {}
 
 
 def _is_evaluated(directory: Path) -> bool:
@@ -152,7 +156,7 @@ def horizon_table(summaries: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     rows, title = [], ""
     for summary in sorted(summaries, key=lambda summary: int(summary["num_slots"])):
         title = earned_title(summary)
-        for scheme in (*COMPARED, *OPTIMA.values()):
+        for scheme in (*DRAWN, *BEST):
             if scheme in summary["schemes"]:
                 result = summary["schemes"][scheme]
                 rate = earned(result)

@@ -3,10 +3,24 @@
 from typing import Literal
 
 from hyuav.envs.rendering import OKABE_ITO
-from hyuav.experiments.schemes import LABELS, OPTIMA, SCHEMES
+from hyuav.experiments.schemes import (
+    LABELS,
+    NO_HELPER,
+    OPTIMA,
+    OPTIMUM_POWER,
+    PROPOSED_POWER,
+    SCHEMES,
+    Kind,
+)
 
 COMPARED = ("proposed", "ja_ot", "re_ot", "re_lt", "ja_lt")
 """The five schemes of the paper."""
+
+DRAWN = (*COMPARED, PROPOSED_POWER, NO_HELPER)
+"""What figures of all schemes show."""
+
+BEST = (*OPTIMA.values(), OPTIMUM_POWER)
+"""The optima that bound them."""
 
 COLORS = {
     "proposed": OKABE_ITO["bluish green"],
@@ -14,6 +28,8 @@ COLORS = {
     "re_ot": OKABE_ITO["blue"],
     "re_lt": OKABE_ITO["sky blue"],
     "ja_lt": OKABE_ITO["orange"],
+    NO_HELPER: OKABE_ITO["black"],
+    PROPOSED_POWER: "#882255",
 }
 """The color of each scheme; one learned by the paper's own algorithm has that of the scheme."""
 
@@ -22,7 +38,11 @@ COLORS |= {
     "optimum": COLORS["proposed"],
     "ja_optimum": COLORS["ja_ot"],
     "re_optimum": COLORS["re_ot"],
+    OPTIMUM_POWER: COLORS[PROPOSED_POWER],
 }
+
+APART = 2.0
+"""How many times the rest a value is that would squash the rest, were both on one axis."""
 
 GREY = "#6B6B6B"
 """Of an unknown scheme, and of what stands for all optima."""
@@ -46,10 +66,16 @@ def mode_rule(scheme: str) -> str:
 
 
 def scheme_line(scheme: str) -> Line:
-    """Dotted for an optimum, dashed for what only jams, solid for what relays or may."""
-    if scheme in OPTIMA.values():
+    """Dotted for an optimum, dashed for what only jams, solid for all else."""
+    if scheme in SCHEMES and SCHEMES[scheme].kind is Kind.OPTIMUM:
         return "dotted"
-    return "dashed" if mode_rule(scheme) == "jamming" else "solid"
+    only_jams = mode_rule(scheme) == "jamming" and scheme != NO_HELPER
+    return "dashed" if only_jams else "solid"
+
+
+def is_apart(value: float, highest: float) -> bool:
+    """Whether a value is so far above all others, up to ``highest``, that it would squash them."""
+    return value > APART * highest
 
 
 def scheme_place(scheme: str) -> int:

@@ -1,12 +1,12 @@
 """Learning curves as Plotly figures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 import plotly.graph_objects as go
 
-from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
+from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER, NO_HELPER
 from hyuav.viz.data.curves import (
     BPS,
     NOISY,
@@ -15,7 +15,14 @@ from hyuav.viz.data.curves import (
     axis_title,
     learning_curves,
 )
-from hyuav.viz.data.schemes import GREY, mode_rule, scheme_color, scheme_label, scheme_line
+from hyuav.viz.data.schemes import (
+    GREY,
+    is_apart,
+    mode_rule,
+    scheme_color,
+    scheme_label,
+    scheme_line,
+)
 from hyuav.viz.html.style import DASHES, axis, base_layout, legend_below, plain, translucent
 
 MAX_POINTS = 300
@@ -31,7 +38,7 @@ _MARKERS = 12
 
 def learning_figure(
     metrics: pd.DataFrame,
-    optima: Mapping[str, float] | None = None,
+    references: Mapping[str, float] | None = None,
     quantity: str = NOISY,
     unit: str = BPS,
 ) -> go.Figure:
@@ -45,7 +52,8 @@ def learning_figure(
     Args:
         metrics: rows of ``metrics.csv``, whose ``scheme`` is a mode rule as it stands there, or
             a name of :data:`hyuav.experiments.schemes.LABELS`. May be empty.
-        optima: what the best flight earns, by mode rule.
+        references: as :func:`.references_of`. What comes without a helper is a line, or where it
+            would squash the curves, a number.
         quantity: a column of :data:`QUANTITIES`.
         unit: of the reward.
     """
@@ -61,7 +69,8 @@ def learning_figure(
             look["marker"] |= {"symbol": symbol, "size": 7, "maxdisplayed": _MARKERS}
         _add_curve(figure, curve, text, look, plain(unit), noisy=quantity == NOISY)
     if len(horizons) <= 1:
-        _add_optima(figure, curves, optima or {})
+        _add_optima(figure, curves, references or {})
+        add_no_helper(figure, references or {})
     if not curves:
         font, middle = {"size": 15}, {"xref": "paper", "x": 0.5, "yref": "paper", "y": 0.5}
         figure.add_annotation(text="no episodes yet", showarrow=False, font=font, **middle)
@@ -141,14 +150,41 @@ def add_band(
 
 
 def _add_optima(
-    figure: go.Figure, curves: Sequence[LearningCurve], optima: Mapping[str, float]
+    figure: go.Figure, curves: Sequence[LearningCurve], references: Mapping[str, float]
 ) -> None:
     """A dotted line for each curve's optimum; one legend entry stands for them all."""
     rules = {curve.scheme: mode_rule(curve.scheme) for curve in curves}
-    values = {optima[rule]: scheme for scheme, rule in rules.items() if rule in optima}
+    values = {references[rule]: scheme for scheme, rule in rules.items() if rule in references}
     for value, scheme in values.items():
         line = {"color": scheme_color(scheme), "width": 1.4, "dash": DASHES["dotted"]}
         figure.add_hline(y=value, line=line)
     if values:
         line = {"color": GREY, "width": 1.4, "dash": DASHES["dotted"]}
         figure.add_scatter(x=[None], y=[None], mode="lines", line=line, name="its optimum")
+
+
+def add_no_helper(
+    figure: go.Figure,
+    references: Mapping[str, float],
+    behind: str = "",
+    text: Callable[[str], str] = plain,
+) -> None:
+    """Set what comes without a helper beside the curves: a line, or a number in the legend.
+
+    Args:
+        figure: of the curves.
+        references: as :func:`.references_of`.
+        behind: the label, in the legend.
+        text: writes the label as HTML.
+    """
+    value = references.get(NO_HELPER)
+    if value is None:
+        return
+    drawn = [height for own in figure.data for height in own.y if height is not None]
+    highest = max((float(height) for height in drawn if height == height), default=value)
+    label, line = f"{scheme_label(NO_HELPER)}{behind}", {"color": scheme_color(NO_HELPER)}
+    if is_apart(value, highest):
+        label, invisible = f"{label}: {value:.4g}", {"color": "rgba(0, 0, 0, 0)"}
+        figure.add_scatter(x=[None], y=[None], mode="lines", line=invisible, name=text(label))
+    else:
+        figure.add_hline(y=value, line=line | {"width": 1.4}, name=text(label), showlegend=True)

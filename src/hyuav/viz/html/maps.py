@@ -35,7 +35,8 @@ def sum_rate_map(scenario: Scenario, mode: Mode = "better", resolution: float = 
 def map_figure(scenario: Scenario, brings: HelperMap, mode: Mode) -> go.Figure:
     """What :func:`sum_rate_map` draws, of a map that is computed already."""
     axis, rates = brings.axis, brings.rates
-    alone = " of one helper alone" if scenario.num_helpers > 1 else ""
+    of_one = " of one helper alone" if scenario.num_helpers > 1 else ""
+    alone = f"without a helper {brings.without_helper:.2f}"
     figure = go.Figure(layout=base_layout())
     figure.add_heatmap(
         x=axis,
@@ -45,7 +46,7 @@ def map_figure(scenario: Scenario, brings: HelperMap, mode: Mode) -> go.Figure:
         zmax=max(float(rates["better"].max()), 1e-6),
         colorscale="Viridis",
         colorbar={
-            "title": {"text": f"Secrecy sum-rate{alone} (bps/Hz)", "side": "bottom"},
+            "title": {"text": f"Secrecy sum-rate{of_one} (bps/Hz); {alone}", "side": "bottom"},
             "orientation": "h",
             "thickness": 12,
             "y": -0.16,

@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import Flight, read_flight, told_modes
 from hyuav.viz.data.schemes import scheme_color, scheme_label
-from hyuav.viz.html.player_layout import animation_controls, layouts
+from hyuav.viz.html.player_layout import animation_controls, layouts, power_axis
 from hyuav.viz.html.player_map import fixed_on_map, moving_on_map
 from hyuav.viz.html.player_panels import fixed_in_panels, highest, moving_in_panels
 from hyuav.viz.html.style import base_layout, plain
@@ -24,7 +24,8 @@ def flight_player(
 
     The map shows the path flown so far (relaying solid, jamming dashed), which UEs offload
     (filled), the links that are alive and the coverage that counts; beside it stand the slot's
-    secrecy rates, its energies as shares of the budgets, and the sum-rates of all slots.
+    secrecy rates, its energies as shares of the budgets, and the sum-rates of all slots, with the
+    helpers' power where that is chosen.
 
     Args:
         scenario: that was flown.
@@ -64,6 +65,8 @@ def flight_player(
     )
     figure.update_layout(animation_controls(num_slots))
     figure.update_layout(both["shared"])
+    if flight.power_level is not None:
+        figure.update_layout(power_axis(scenario))
     figure.update_layout(both["narrow" if narrow else "wide"])
     figure.update_layout(meta={name: both[name] for name in ("wide", "narrow")})
     return figure
@@ -73,8 +76,9 @@ def _title(flight: Flight, slot: int) -> str:
     """What a person reads of the slot, on two lines."""
     row, relay = flight.rows.iloc[slot], flight.relay[slot]
     count, total = int(flight.offloading[slot].sum()), flight.offloading.shape[1]
-    one = "relay" if relay.all() else "jamming"
-    name, mode = plain(scheme_label(flight.scheme)), one if len(relay) == 1 else told_modes(relay)
+    name, told = plain(scheme_label(flight.scheme)), flight.told_power(slot)
+    one = ("relay" if relay.all() else "jamming") + told[0]
+    mode = one if len(relay) == 1 else told_modes(relay, told)
     off_map = ", turned back at the edge" if flight.off_map[slot].any() else ""
     return (
         f"<b>{name}, slot {slot + 1} of {flight.num_slots}: {mode}</b>{off_map}"

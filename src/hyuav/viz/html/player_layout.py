@@ -35,6 +35,18 @@ def layouts(
     return {"shared": shared, "wide": _wide(), "narrow": _narrow()}
 
 
+def power_axis(scenario: Scenario) -> dict[str, Any]:
+    """The axis of the helper's power, on the right of the sum-rates.
+
+    Args:
+        scenario: whose range of power is shown.
+    """
+    beside = {"anchor": "x4", "overlaying": "y4", "side": "right", "showgrid": False}
+    lowest = -scenario.power_range
+    look = {"range": [1.05 * lowest, -0.05 * lowest], "tickvals": [lowest, lowest / 2, 0]}
+    return {"yaxis5": axis("Power of H<br>(dB)", **beside, **look)}
+
+
 def _wide() -> dict[str, Any]:
     beside = [0.56, 1.0]
     return {

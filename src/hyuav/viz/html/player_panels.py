@@ -1,14 +1,16 @@
 """The player's panels: each slot's secrecy rates and energies, and the sum-rates of all slots."""
 
+from itertools import cycle
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hyuav.envs.rendering import LEGITIMATE_COLOR
+from hyuav.envs.rendering import LEGITIMATE_COLOR, OKABE_ITO
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import Flight, budgets, names
 from hyuav.viz.html.player_map import Trace, trace
-from hyuav.viz.html.style import translucent
+from hyuav.viz.html.style import DASHES, translucent
 
 _LABELLED_UES = 24
 """Beyond this many UEs, the bars are too narrow for their values."""
@@ -21,10 +23,10 @@ def highest(flight: Flight) -> list[float]:
 
 
 def fixed_in_panels(flight: Flight) -> list[Trace]:
-    """The sum-rates that each mode would have brought, slot by slot."""
+    """The sum-rates that each mode would have brought, slot by slot, and the helpers' power."""
     slots = list(range(1, flight.num_slots + 1))
     rates = flight.rows[["relay_sum_rate", "jamming_sum_rate"]].to_numpy(float).round(4)
-    return [
+    by_mode = [
         _panel(
             4,
             "scatter",
@@ -37,6 +39,33 @@ def fixed_in_panels(flight: Flight) -> list[Trace]:
         )
         for column, (name, dash) in enumerate((("relaying", "solid"), ("jamming", "6px,4px")))
     ]
+    if flight.power_level is None:
+        return by_mode
+    helpers = names("H", flight.power_level.shape[1])
+    dashes = cycle(DASHES.values())
+    powers = zip(helpers, flight.power_level.T, dashes, strict=False)
+    return [*by_mode, *(_power(slots, *own) for own in powers)]
+
+
+def _power(slots: list[int], helper: str, level: NDArray[np.float64], dash: str) -> Trace:
+    """A helper's power in all slots, a step for each."""
+    steps = _panel(
+        4,
+        "scatter",
+        x=slots,
+        y=level.round(2).tolist(),
+        name=f"power of {helper}",
+        mode="lines",
+        line={
+            "color": OKABE_ITO["reddish purple"],
+            "width": 1.6,
+            "shape": "hvh",
+            "dash": dash,
+        },
+        hovertemplate=f"{helper}, slot %{{x}}: %{{y:.1f}} dB relative to the nominal power"
+        "<extra></extra>",
+    )
+    return steps | {"yaxis": "y5"}
 
 
 def _panel(number: int, kind: str, **values: Any) -> Trace:

@@ -13,9 +13,10 @@ from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LEARNED_AS_IN_PAPER
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import SMOOTHING, axis_title
+from hyuav.viz.data.flights import flying_schemes
 from hyuav.viz.data.flying import QUICK, fly_now
 from hyuav.viz.data.maps import helper_map
-from hyuav.viz.data.reading import optima_of, readable_config, unit_of
+from hyuav.viz.data.reading import readable_config, references_of, unit_of
 from hyuav.viz.data.runs import (
     all_metrics,
     evaluated_scenario,
@@ -23,7 +24,7 @@ from hyuav.viz.data.runs import (
     own_first,
     readable_scenario,
 )
-from hyuav.viz.data.schemes import scheme_label, scheme_place
+from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html.curves import MAX_POINTS, QUANTITIES, learning_figure
 from hyuav.viz.html.document import Page, Picture, Section
 from hyuav.viz.html.maps import TITLES, map_figure
@@ -112,7 +113,7 @@ def _flights(several: Sequence[tuple[Scenario, Evaluation]], note: str) -> Secti
     figures, notes = {}, [note]
     for scenario, flown in several:
         horizon = f"T = {scenario.num_slots}: " if len(several) > 1 else ""
-        for scheme in sorted(dict.fromkeys(flown.flights["scheme"]), key=scheme_place):
+        for scheme in flying_schemes(flown.flights):
             label = f"{horizon}{scheme_label(scheme)}"
             try:
                 figures[label] = flight_player(scenario, flown.flights, scheme)
@@ -133,12 +134,12 @@ def _curves(
     scenario: Scenario | None,
     unit: str,
 ) -> Section:
-    optima = {summary["num_slots"]: optima_of(summary) for summary in summaries}
+    beside = {summary["num_slots"]: references_of(summary) for summary in summaries}
     horizons = own_first(metrics["num_slots"].dropna().unique(), scenario)
     figures = {
         axis_title(quantity, unit)
         + (f", T = {horizon:.0f}" if len(horizons) > 1 else ""): learning_figure(
-            own, optima.get(int(horizon)), quantity, unit
+            own, beside.get(int(horizon)), quantity, unit
         )
         for horizon in horizons
         for own in [metrics[metrics["num_slots"] == horizon]]

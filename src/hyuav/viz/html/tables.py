@@ -59,10 +59,11 @@ def scheme_table(summary: Mapping[str, Any]) -> Markup:
         summary: as :attr:`hyuav.experiments.evaluation.Evaluation.summary`.
     """
     swatch = Markup('<span class="swatch" style="background:{}"></span>{}')
+    bounded = is_bounded(summary)
     rows = [
         (
             swatch.format(scheme_color(scheme), scheme_label(scheme)),
-            *flight_cells(result),
+            *flight_cells(result, bounded=bounded),
             f"{1e3 * result['ue_energy']:.1f}",
             f"{result['edge_energy']:.1f}",
             f"{result['helper_energy'] / 1e3:.2f}",
@@ -74,7 +75,6 @@ def scheme_table(summary: Mapping[str, Any]) -> Markup:
         f"T = {summary['num_slots']}: mean of {summary['episodes']} episodes on the same fading, "
         "with the 95 % interval; energies per episode"
     )
-    bounded = is_bounded(summary)
     if bounded:
         caption += f"; {upper_bounds(summary)}"
     hybrid = "of own upper bound" if bounded else "of hybrid optimum"

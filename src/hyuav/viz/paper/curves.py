@@ -1,20 +1,26 @@
 """Accumulated reward against episodes: the paper's Fig. 2."""
 
+from collections.abc import Iterable
+
 import matplotlib as mpl
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hyuav.experiments.schemes import NO_HELPER
 from hyuav.viz.data.curves import BPS, NOISY, axis_title
-from hyuav.viz.data.schemes import COLORS, scheme_label, scheme_line
+from hyuav.viz.data.schemes import COLORS, is_apart, scheme_label, scheme_line
 from hyuav.viz.paper.style import COLUMN_WIDTH, LINES, STYLE, legend_below
 
 
 def learning_figure(table: pd.DataFrame) -> Figure:
     """Accumulated reward against episodes, with bands, and the optimum of each scheme as a line.
 
+    What comes without a helper is a line too, or where it would squash the curves, a number.
+
     Args:
         table: of :func:`.learning_table`, of one training or several, each of which has a panel;
-            its ``attrs`` may tell the ``unit`` of the reward.
+            its ``attrs`` may tell the ``unit`` of the reward, and what comes without a helper.
     """
     trainings = list(dict.fromkeys(table["training"]))
     with mpl.rc_context(STYLE):
@@ -39,7 +45,18 @@ def learning_figure(table: pd.DataFrame) -> Figure:
         dotted = LINES["dotted"]
         panels[-1].plot([], [], color="0.3", linewidth=0.9, linestyle=dotted, label="its optimum")
         panels[-1].set_xlabel("Episode")
+        if (alone := table.attrs.get(NO_HELPER)) is not None:
+            _add_no_helper(panels, alone)
         handles, _ = panels[-1].get_legend_handles_labels()
-        legend_below(figure, handles, 4, 2.0)
+        legend_below(figure, handles, 4 if len(handles) < 5 else 3, 2.0)
         figure.supylabel(axis_title(NOISY, table.attrs.get("unit", BPS)), fontsize=8)
         return figure
+
+
+def _add_no_helper(panels: Iterable[Axes], value: float) -> None:
+    label = scheme_label(NO_HELPER)
+    for axes in panels:
+        if is_apart(value, axes.get_ylim()[1]):
+            axes.plot([], [], linestyle="none", label=f"{label}: {value:.4g}")
+        else:
+            axes.axhline(value, color=COLORS[NO_HELPER], linewidth=0.9, label=label)

@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR, draw_flight, draw_scenario, mode_handles
-from hyuav.experiments.schemes import LABELS
+from hyuav.experiments.schemes import LABELS, OPTIMUM_POWER, PROPOSED_POWER
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import Flight, first_flights, flight_tables
 from hyuav.viz.data.schemes import COLORS
@@ -31,8 +31,12 @@ FLIGHT_PANELS = {
     "optimum": ["proposed"],
     "re_optimum": ["re_ot", "re_lt"],
     "ja_optimum": ["ja_ot", "ja_lt"],
+    OPTIMUM_POWER: [PROPOSED_POWER],
 }
-"""The maps of the flight figure: the optimum underneath, and the schemes flown over it."""
+"""The maps of the flight figure: the optimum underneath, and the schemes flown over it.
+
+The last is there where a learner chose the helper's power.
+"""
 
 _PANELS_SCHEMES = [name for optimum, over in FLIGHT_PANELS.items() for name in (optimum, *over)]
 
@@ -78,15 +82,20 @@ def flight_map(scenario: Scenario, flights: pd.DataFrame) -> Figure:
     """
     flown = first_flights(scenario, flights, _PANELS_SCHEMES)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(PAGE_WIDTH, 3.05), layout="constrained")
-        row: list[Axes] = list(figure.subplots(1, len(FLIGHT_PANELS), sharey=True))
-        for axes, (optimum, schemes) in zip(row, FLIGHT_PANELS.items(), strict=True):
+        with_power = PROPOSED_POWER in flown
+        panels = list(FLIGHT_PANELS.items())[: None if with_power else -1]
+        figure = Figure(figsize=(PAGE_WIDTH, 2.6 if with_power else 3.05), layout="constrained")
+        row: list[Axes] = list(figure.subplots(1, len(panels), sharey=True))
+        for axes, (optimum, schemes) in zip(row, panels, strict=True):
             draw_scenario(axes, scenario)
             _draw_optimum(axes, flown, optimum)
             for scheme in schemes:
                 _draw_scheme(axes, flown, scheme)
             axes.set_title(" and ".join(LABELS[scheme] for scheme in schemes))
             axes.label_outer()
+            if with_power:  # narrow panels, whose outermost labels would touch
+                quarter = scenario.map_side / 4
+                axes.set_xticks([-quarter, 0.0, quarter])
         handles = {
             label: handle
             for axes in row

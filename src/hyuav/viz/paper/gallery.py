@@ -20,7 +20,7 @@ from hyuav.viz.data.flights import (
     read_flight,
 )
 from hyuav.viz.data.maps import helper_map
-from hyuav.viz.data.runs import AS_IN_PAPER, FinishedRun
+from hyuav.viz.data.runs import AS_IN_PAPER, WITH_POWER, FinishedRun
 from hyuav.viz.data.schemes import COMPARED
 from hyuav.viz.paper.animation import animate_flight
 from hyuav.viz.paper.curves import learning_figure
@@ -96,7 +96,7 @@ def draw(run: RunDirectory, names: Sequence[str] | None, console: Console) -> No
         InputError: there is no run, or a file that a named figure needs is missing.
     """
     within = sorted(file.parent for file in run.path.glob("*/config.yaml"))
-    further = [RunDirectory(path) for path in within if path.name != AS_IN_PAPER]
+    further = [RunDirectory(path) for path in within if path.name not in (AS_IN_PAPER, WITH_POWER)]
     several = [(each, FinishedRun(each)) for each in (run, *further)]
     drawings = [(*own, name) for own in several for name in names or FIGURES]
     with make_progress(console, "figures") as progress:

@@ -9,12 +9,15 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from hyuav.envs.rendering import draw_scenario
+from hyuav.experiments.schemes import NO_HELPER
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.paper.style import COLUMN_WIDTH, MODE_COLORS, STYLE, legend_below
 
 
 def sum_rate_maps(scenario: Scenario, table: pd.DataFrame) -> Figure:
     """The secrecy sum-rate in relay, in jamming and in the better mode, and which one that is.
+
+    What comes without a helper, wherever that would be, is told as a number.
 
     Args:
         scenario: whose map is drawn.
@@ -39,8 +42,9 @@ def sum_rate_maps(scenario: Scenario, table: pd.DataFrame) -> Figure:
             image = axes.imshow(
                 rates, origin="lower", extent=extent, cmap="viridis", vmin=0.0, vmax=better.max()
             )
-        alone = " of one helper alone" if scenario.num_helpers > 1 else ""
-        label = f"Secrecy sum-rate{alone} (bps/Hz)"
+        of_one = " of one helper" if scenario.num_helpers > 1 else ""
+        alone = f"without a helper {table[NO_HELPER].iloc[0]:.2f}"
+        label = f"Secrecy sum-rate{of_one} (bps/Hz); {alone}"
         figure.colorbar(image, ax=panels, location="top", label=label, aspect=35)
         colors = ListedColormap(list(MODE_COLORS.values()))
         panels[3].imshow(chosen, origin="lower", extent=extent, cmap=colors, vmin=-0.5, vmax=2.5)

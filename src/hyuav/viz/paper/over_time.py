@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from hyuav.viz.data.flights import MODE_ROWS
-from hyuav.viz.data.schemes import COLORS, COMPARED, scheme_label, scheme_line
+from hyuav.viz.data.schemes import COLORS, DRAWN, scheme_label, scheme_line
 from hyuav.viz.paper.style import (
     COLUMN_WIDTH,
     LINES,
@@ -32,6 +32,8 @@ NOTHING = "0.88"
 def energy_by_slot(table: pd.DataFrame) -> Figure:
     """The energy of every UE under one scheme, and of L and of each helper under all.
 
+    Where some scheme chooses the helpers' power, that is shown below.
+
     Args:
         table: of :func:`.energy_table`. The UEs are those of its first scheme.
     """
@@ -40,16 +42,15 @@ def energy_by_slot(table: pd.DataFrame) -> Figure:
     ues = [rows[rows["scheme"] == scheme] for name, rows in nodes.items() if name[:2] == "UE"]
     with mpl.rc_context(STYLE):
         below = [name for name in nodes if name[:2] != "UE"]  # L and the helpers
-        inches = COLUMN_WIDTH, 2.8 + 1.1 * len(below)
-        figure = Figure(figsize=inches, layout="constrained")
-        of_ues, *panels = figure.subplots(
-            1 + len(below), sharex=True, height_ratios=(1.5, *[1] * len(below))
-        )
+        powered = below[1:] if "power_level" in table else []
+        count = len(below) + len(powered)
+        figure = Figure(figsize=(COLUMN_WIDTH, 2.8 + 1.1 * count), layout="constrained")
+        of_ues, *panels = figure.subplots(1 + count, sharex=True, height_ratios=(1.5, *[1] * count))
         budget = 1e3 * ues[0]["budget"].iloc[0]
         image = _by_ue(of_ues, [1e3 * rows["energy"] for rows in ues], budget)
         label = f"Energy of each UE, {scheme_label(scheme)} (mJ; budget {budget:g} mJ)"
         figure.colorbar(image, ax=of_ues, location="top", label=label, aspect=35)
-        for axes, node in zip(panels, below, strict=True):
+        for axes, node in zip(panels, below, strict=False):
             scale, unit = (1.0, "J") if node == "L" else (1e-3, "kJ")
             for name, rows in nodes[node].groupby("scheme", sort=False):
                 axes.plot(rows["slot"], scale * rows["energy"], **_look(str(name)))
@@ -58,12 +59,24 @@ def energy_by_slot(table: pd.DataFrame) -> Figure:
             axes.set_ylabel(f"Energy of {node} ({unit})")
             axes.grid()
             axes.set_axisbelow(True)
+        for axes, node in zip(panels[len(below) :], powered, strict=True):
+            _power_by_slot(axes, node, nodes[node])
         panels[-1].set_xlabel("Slot")
         handles, _ = panels[0].get_legend_handles_labels()
         budget_line = Line2D([], [], color="0.3", linewidth=0.9, linestyle="dashdot")
         budget_line.set_label("budget per slot")
         legend_below(figure, [*handles, budget_line], 3)
         return figure
+
+
+def _power_by_slot(axes: Axes, helper: str, rows: pd.DataFrame) -> None:
+    """A helper's power in each slot, a step for each, under the schemes that choose it."""
+    for name, own in rows.dropna(subset="power_level").groupby("scheme", sort=False):
+        axes.step(own["slot"], own["power_level"], where="mid", **_look(str(name)))
+    axes.axhline(0.0, color="0.3", linewidth=0.9, linestyle="dashdot")
+    axes.set_ylabel(f"Power of {helper} (dB)")
+    axes.grid()
+    axes.set_axisbelow(True)
 
 
 def offloading_by_slot(table: pd.DataFrame) -> Figure:
@@ -95,7 +108,7 @@ def offloading_by_slot(table: pd.DataFrame) -> Figure:
         image = _by_ue(of_ues, rates, max(own["secrecy_rate"].max(), 0.1))
         label = f"Secrecy rate of each UE, {scheme_label(first)} (bps/Hz)"
         figure.colorbar(image, ax=of_ues, location="top", label=label, aspect=35)
-        for name in (name for name in schemes if name in COMPARED):
+        for name in (name for name in schemes if name in DRAWN):
             count = schemes[name].groupby("slot")["offloading"].sum()
             of_counts.plot(count.index, count, **_look(name))
         of_counts.set(xlabel="Slot", ylabel="UEs that offload", ylim=(0, 1.08 * len(rates)))
