@@ -11,7 +11,6 @@ import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to loa
 
 # isort: split
 
-import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -33,7 +32,7 @@ from hyuav.experiments.configuration import (
 from hyuav.experiments.regimes.plan import Axes, Axis, Regimes
 from hyuav.experiments.regimes.work import RegimeDirectory
 from hyuav.experiments.scenarios import named_scenario
-from hyuav.viz.data.regimes import LABELS, RegimeMap, read_regimes, shares_table
+from hyuav.viz.data.regimes import LABELS, RegimeMap, read_regimes, shares_table, times
 from hyuav.viz.paper.regimes import regimes_figure
 from hyuav.viz.paper.style import save_figure
 
@@ -81,8 +80,7 @@ def print_shares(shown: RegimeMap, console: Console) -> None:
         title, "Best at fixed power", "share of\nthe map", "times the\nothers, most"
     )
     for _, row in shares_table(shown).iterrows():
-        most = "-" if math.isnan(row["factor"]) else f"{row['factor']:.2f}"
-        table.add_row(LABELS[row["best"]], percent(row["share"]), most)
+        table.add_row(LABELS[row["best"]], percent(row["share"]), times(row["factor"]))
     print_table(table, console)
 
 

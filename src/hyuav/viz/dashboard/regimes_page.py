@@ -7,7 +7,7 @@ from hyuav._support.formatting import percent
 from hyuav.experiments.regimes.work import REGIMES_FILE
 from hyuav.viz.dashboard.plain import ensure_offered, plain, refusals
 from hyuav.viz.data.index import RunIndex
-from hyuav.viz.data.regimes import LABELS, STEPS, RegimeMap, read_regimes, shares_table
+from hyuav.viz.data.regimes import LABELS, STEPS, RegimeMap, read_regimes, shares_table, times
 from hyuav.viz.html.regimes import BEST, VIEWS, regimes_map
 
 KEPT = ("regimes_map", "regimes_view")
@@ -55,7 +55,7 @@ def _draw(found: RegimeMap, view: str) -> None:
         {
             "Best at fixed power": [LABELS[name] for name in shares["best"]],
             "Share of the map": [percent(share) for share in shares["share"]],
-            "Times the others, at most": shares["factor"],
+            "Times the others, at most": [times(factor) for factor in shares["factor"]],
         },
         hide_index=True,
     )

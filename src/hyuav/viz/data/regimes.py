@@ -1,6 +1,7 @@
 """Which scheme is best at each point of a map of regimes, and by how much."""
 
 import io
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -171,6 +172,13 @@ def shade(color: str, number: int) -> str:
     share = 0.3 + 0.7 * number / len(STEPS)
     channels = (int(color[start : start + 2], 16) for start in (1, 3, 5))
     return "#" + "".join(f"{round(255 - share * (255 - own)):02X}" for own in channels)
+
+
+def times(factor: float) -> str:
+    """How many times as much; "-" where there is nothing, and a sign where only one brings any."""
+    if math.isnan(factor):
+        return "-"
+    return f"{factor:.2f}" if math.isfinite(factor) else "∞"
 
 
 def shares_table(found: RegimeMap) -> pd.DataFrame:

@@ -51,10 +51,10 @@ def regimes_map(found: RegimeMap, view: str = BEST) -> go.Figure:
         )
     _add_own(figure, found)
     figure.update_layout(
-        height=560,
+        height=600,
         showlegend=True,
-        margin={"l": 8, "r": 8, "t": 12, "b": 8},
-        legend=legend_below(y=-0.14),
+        margin={"l": 8, "r": 8, "t": 12, "b": 150},
+        legend=legend_below(yref="container", y=0.01, yanchor="bottom"),
         xaxis=_axis(x),
         yaxis=_axis(y),
     )
@@ -88,10 +88,13 @@ def _gain(found: RegimeMap) -> dict[str, Any]:
         "zmax": float(np.log(most)),
         "colorscale": "Viridis",
         "colorbar": {
-            "title": {"text": "Times the best<br>at fixed power", "side": "top"},
+            "title": {"text": "Times the best at fixed power", "side": "bottom"},
             "tickvals": np.log(ticks),
             "ticktext": [f"{level:g}" for level in ticks],
-            "thickness": 14,
+            "orientation": "h",
+            "thickness": 12,
+            "y": -0.13,
+            "yanchor": "top",
         },
     }
 
