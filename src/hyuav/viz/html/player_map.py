@@ -55,7 +55,10 @@ def fixed_on_map(scenario: Scenario, flight: Flight) -> list[Trace]:
 def _pieces(paths: Iterable[Sequence[Sequence[float]]]) -> tuple[list[Any], list[Any]]:
     """Several paths of (x, y) as one line with gaps; :data:`_NOTHING` where there is none."""
     points = [point for path in paths for point in ((None, None), *path)][1:]
-    return tuple(map(list, zip(*points, strict=True))) if points else (_NOTHING, _NOTHING)
+    if not points:
+        return _NOTHING, _NOTHING
+    x, y = zip(*points, strict=True)
+    return list(x), list(y)
 
 
 def moving_on_map(scenario: Scenario, flight: Flight, slot: int, color: str) -> list[Trace]:
