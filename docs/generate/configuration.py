@@ -90,7 +90,7 @@ def configuration_page() -> str:
 def _preset(name: str) -> str:
     """An item of a list: a preset and the fields that it gives besides the UEs."""
     paper = Scenario(ue_positions=PRESETS[name].ue_positions).to_dict()
-    own = [(field, value) for field, value in PRESETS[name].to_dict().items()]
+    own = PRESETS[name].to_dict().items()
     given = [f"`{field}={_shown(value)}`" for field, value in own if value != paper[field]]
     return f"- `{name}`" + (f": {', '.join(given)}" if given else "")
 

@@ -231,9 +231,9 @@ def _completed(group: str, member: str, values: Config) -> Config:
     elif group == LOGGER:
         defaults = LoggerParameters.defaults()
     else:
-        preset = values.get("name", member)
-        known = preset if preset in PRESETS else NAMES[0]
-        defaults = offered(str(values.get("layout", known)))
+        preset = str(values.get("name", member))
+        base = preset if preset in PRESETS else NAMES[0]
+        defaults = offered(str(values.get("layout", base)))
         defaults.pop("ue_positions", None)
     completed = {**defaults, **values}
     for name, own in defaults.items():

@@ -15,7 +15,7 @@ from hyuav.experiments.train import train
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
-from hyuav.references.straight import re_lt
+from hyuav.references.straight import ja_lt, re_lt
 from offline_wandb import history, offline_runs, recorded, summary
 from recipe_calls import TINY_COMPARISON, TINY_TRAINING, Call
 
@@ -43,6 +43,21 @@ def evaluated() -> Evaluation:
 def table(directory: Path, record: dict[str, Any], name: str) -> dict[str, Any]:
     assert record[f"{name}/_type"] == "table-file"
     return dict(json.loads((directory / "files" / record[f"{name}/path"]).read_text()))
+
+
+def test_each_of_several_helpers_is_logged_with_the_upper_bound(tmp_path: Path) -> None:
+    two = dataclasses.replace(Scenario.preset("contested"), num_slots=5)
+    parameters, bounds = EvaluationParameters(episodes=3, flights=1), {"ja_optimum": 100.0}
+    flown = {"ja_lt": ja_lt(two)}
+    evaluation = evaluate(two, "contested", flown, parameters, upper_bounds=bounds)
+    logger = EvaluationLoggerParameters(mode="offline")
+    log_evaluation(tmp_path, evaluation, [], logger, SILENT)
+    (file,) = offline_runs(tmp_path)
+    told, (record,) = summary(file), history(file)
+    found = evaluation.summary["schemes"]["ja_lt"]
+    for name in ("fraction_of_upper_bound", "relay_share_1", "off_map_1", "helper_energy_2"):
+        assert told[f"ja_lt/{name}"] == pytest.approx(found[name])
+    assert {"x_1", "relay_2", "way"} < set(table(file.parent, record, "flights")["columns"])
 
 
 def test_an_evaluation_is_logged_beside_its_training(tmp_path: Path) -> None:

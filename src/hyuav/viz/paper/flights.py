@@ -1,22 +1,21 @@
 """Flights over the map: the paper's Fig. 3, and every scheme over its own optimum."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
 from hyuav.envs.rendering import LEGITIMATE_COLOR, draw_flight, draw_scenario, mode_handles
 from hyuav.experiments.schemes import LABELS, OPTIMUM_POWER, PROPOSED_POWER
-from hyuav.physics.scenario import Scenario
+from hyuav.physics.scenario import Point, Scenario
 from hyuav.viz.data.flights import Flight, first_flights, flight_tables
 from hyuav.viz.data.schemes import COLORS
 from hyuav.viz.paper.style import COLUMN_WIDTH, PAGE_WIDTH, STYLE, legend_below, save_figure
@@ -141,15 +140,15 @@ def _draw_scheme(axes: Axes, flown: Mapping[str, Flight], scheme: str) -> None:
             path = flight.path[:, helper]
             draw_flight(axes, path, flight.relay[:, helper], color, label)
             if flight.relay.shape[1] > 1:
-                _number(axes, helper + 1, path[-1], color)
+                _number(axes, helper + 1, flight.helpers(flight.num_slots)[helper], color)
 
 
-def _number(axes: Axes, number: int, end: NDArray[np.float64], color: str) -> None:
+def _number(axes: Axes, number: int, end: Point, color: str) -> None:
     """Tell which of several helpers ends there, beside the star, towards the middle of the map."""
     axes.annotate(
         str(number),
-        (float(end[0]), float(end[1])),
-        tuple(np.where(end > 0, -7.0, 7.0).tolist()),
+        end,
+        (-math.copysign(7.0, end[0]), -math.copysign(7.0, end[1])),
         textcoords="offset points",
         ha="center",
         va="center",
