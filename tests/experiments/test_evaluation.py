@@ -291,3 +291,24 @@ def test_the_power_along_the_flight_is_kept_where_a_scheme_chooses_it() -> None:
     assert level.count().to_dict() == {"optimum_power": 2 * SCENARIO.num_slots, "re_lt": 0}
     own = level.get_group("optimum_power").to_numpy()[: SCENARIO.num_slots]
     np.testing.assert_allclose(own, np.linspace(0.0, -60.0, SCENARIO.num_slots), atol=1e-3)
+
+
+def test_what_no_flight_exceeds_stands_beside_a_flight_that_knows_it() -> None:
+    path = torch.tensor(SCENARIO.helper_starts).expand(SCENARIO.num_slots + 1, 1, 2)
+    policies = {"optimum": FlightPolicy(path, SCENARIO, upper_bound=12.5), "re_lt": re_lt(SCENARIO)}
+    schemes = evaluate(SCENARIO, "", policies, FEW).summary["schemes"]
+    assert schemes["optimum"]["upper_bound"] == 12.5
+    assert "upper_bound" not in schemes["re_lt"]
+
+
+@pytest.mark.slow
+def test_the_upper_bound_of_several_helpers_stands_beside_their_optimum() -> None:
+    two = dataclasses.replace(
+        SCENARIO, num_slots=2, helper_starts=((60.0, 60.0), (-60.0, -60.0)), fading=False
+    )
+    found = evaluate(two, "two", reference_policies(two, 50.0, Console(quiet=True)), FEW)
+    schemes = found.summary["schemes"]
+    for name in OPTIMA.values():
+        own = schemes[name]
+        assert own["upper_bound"] >= own["secrecy_sum_rate"]["mean"] - 1e-4
+    assert not {name for name, own in schemes.items() if "upper_bound" in own} - {*OPTIMA.values()}

@@ -68,5 +68,11 @@ def test_energy_budgets_that_are_exceeded_are_told() -> None:
     assert "Proposed: 0.50 energy budgets exceeded per episode" in printed(budget_violations=0.5)
 
 
+def test_what_no_flight_exceeds_is_told_where_it_is_known() -> None:
+    told = "Optimum: no flight is expected to earn more than 65.96"
+    assert told in printed(scheme="optimum", upper_bound=65.959)
+    assert not any("no flight" in line for line in printed(scheme="optimum"))
+
+
 def test_a_name_is_no_markup() -> None:
     assert any("[/] [red]x" in line for line in printed("[/] [red]x"))

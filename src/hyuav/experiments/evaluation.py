@@ -34,6 +34,7 @@ from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario, as_scenario
+from hyuav.references.flight import FlightPolicy
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -129,7 +130,9 @@ def evaluate(
         "episodes": parameters.episodes,
         "seed": parameters.seed,
         "schemes": {
-            scheme: _returns(flown, scheme) | _account(flights.totals, scenario)
+            scheme: _returns(flown, scheme)
+            | _account(flights.totals, scenario)
+            | _bound(by_scheme[scheme])
             for scheme, flights in flown.items()
         },
         **told,
@@ -285,6 +288,14 @@ def confidence_interval(returns: Array) -> list[float]:
         return [float(sample.mean())] * 2
     interval = stats.t.interval(0.95, len(sample) - 1, sample.mean(), stats.sem(sample))
     return [float(bound) for bound in interval]
+
+
+def _bound(policies: Sequence[TensorDictModuleBase]) -> dict[str, float]:
+    """What no flight exceeds, where the scheme is a flight that knows."""
+    for own in policies:
+        if isinstance(own, FlightPolicy) and own.upper_bound is not None:
+            return {"upper_bound": own.upper_bound}
+    return {}
 
 
 def _account(totals: Mapping[str, Tensor], scenario: Scenario) -> dict[str, Any]:

@@ -31,6 +31,8 @@ def print_results(evaluation: Evaluation, console: Console) -> None:
         table.add_row(LABELS[scheme], *flight_cells(result))
     print_table(table, console)
     for scheme, result in summary["schemes"].items():
+        if (bound := result.get("upper_bound")) is not None:
+            console.print(f"{LABELS[scheme]}: no flight is expected to earn more than {bound:.2f}")
         if result["budget_violations"] > 0:
             count = f"{result['budget_violations']:.2f}"
             console.print(f"{LABELS[scheme]}: {count} energy budgets exceeded per episode")

@@ -126,7 +126,8 @@ def reference_policies(
     with make_progress(console, "optima") as progress:
         optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
-        policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario, optimum.share)]
+        flight = FlightPolicy(optimum.path, scenario, optimum.share, optimum.upper_bound)
+        policies[OPTIMA[rule]] = [flight]
     if scenario.num_helpers == 1 and not scenario.power_control and reward == DEFAULT:
         controlled = SCHEMES[OPTIMUM_POWER].flown_in(scenario)
         spacing = max(resolution or RESOLUTION, POWER_RESOLUTION)
