@@ -110,7 +110,7 @@ def main(config: Config, _: Path) -> None:
         if (output / name).is_dir():
             raise InputError(rejection(name, str(output / name), "a file or none, not a directory"))
     beside = references(scenario, parameters.resolution, console, reward)
-    policies = {**learned, **beside.policies}
+    policies = {**learned, **beside}
     with make_progress(console, "evaluating") as progress:
         evaluation = evaluate(
             scenario,
@@ -120,7 +120,6 @@ def main(config: Config, _: Path) -> None:
             options.device,
             track=progress.track,
             reward=reward,
-            upper_bounds=beside.upper_bounds,
         )
     evaluation.save(output)
     save_flight_map(scenario, evaluation.flights, output / "figures")

@@ -204,12 +204,11 @@ class Work:
             evaluation = evaluate(
                 scenario,
                 trained.scenario_name,
-                {**learned, **best.policies},
+                {**learned, **best},
                 self.evaluation,
                 self.device,
                 track=progress.track,
                 reward=reward,
-                upper_bounds=best.upper_bounds,
             )
         evaluation.save(directory)
         return evaluation

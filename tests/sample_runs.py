@@ -59,7 +59,7 @@ def evaluated(trained: RunDirectory, tmp_path_factory: pytest.TempPathFactory) -
     """The same, evaluated beside the references."""
     directory = tmp_path_factory.mktemp("evaluated") / "run"
     shutil.copytree(trained.path, directory)
-    beside = references(SCENARIO, 10.0, SILENT).policies
+    beside = references(SCENARIO, 10.0, SILENT)
     policies = learned_policies([trained], SCENARIO) | beside
     parameters = EvaluationParameters(episodes=4, flights=2)
     evaluate(SCENARIO, "two_clusters", policies, parameters).save(directory)

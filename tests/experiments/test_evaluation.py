@@ -289,19 +289,9 @@ def test_what_helpers_do_together_is_made_of_what_each_does() -> None:
     assert found["helper_energy_1"] > found["helper_energy_2"] > 0.0
 
 
-def test_the_fractions_of_upper_bounds_are_of_each_mode_rules_own() -> None:
-    policies = {"re_lt": re_lt(SCENARIO), "ja_lt": ja_lt(SCENARIO)}
-    bounds = {"re_optimum": 100.0, "optimum": 300.0}
-    found = evaluate(SCENARIO, "x", policies, FEW, upper_bounds=bounds).summary["schemes"]
-    mean = found["re_lt"]["secrecy_sum_rate"]["mean"]
-    assert found["re_lt"]["upper_bound"] == 100.0
-    assert found["re_lt"]["fraction_of_upper_bound"] == pytest.approx(mean / 100.0)
-    assert "fraction_of_upper_bound" not in found["ja_lt"]
-
-
 def test_the_optimum_flies_with_the_power_that_was_chosen() -> None:
     scenario = dataclasses.replace(SCENARIO, power_control=True, power_range=30.0, fading=False)
-    policies = references(scenario, 10.0, Console(quiet=True)).policies
+    policies = references(scenario, 10.0, Console(quiet=True))
     found = evaluate(scenario, "power", policies, FEW).summary["schemes"]
     best = solve_optimum(scenario, resolution=10.0)
     for scheme, rule in (("optimum", "hybrid"), ("ja_optimum", "jamming")):
@@ -323,3 +313,30 @@ def test_the_power_along_the_flight_is_kept_where_a_scheme_chooses_it() -> None:
     assert level.count().to_dict() == {"optimum_power": 2 * SCENARIO.num_slots, "re_lt": 0}
     own = level.get_group("optimum_power").to_numpy()[: SCENARIO.num_slots]
     np.testing.assert_allclose(own, np.linspace(0.0, -60.0, SCENARIO.num_slots), atol=1e-3)
+
+
+def test_fractions_of_upper_bounds_are_of_each_mode_rules_own() -> None:
+    path = torch.tensor(SCENARIO.helper_starts).expand(SCENARIO.num_slots + 1, 1, 2)
+    policies = {
+        "re_optimum": FlightPolicy(path, SCENARIO, upper_bound=12.5),
+        "re_lt": re_lt(SCENARIO),
+        "ja_lt": ja_lt(SCENARIO),
+    }
+    found = evaluate(SCENARIO, "", policies, FEW).summary["schemes"]
+    mean = found["re_lt"]["secrecy_sum_rate"]["mean"]
+    assert found["re_optimum"]["upper_bound"] == found["re_lt"]["upper_bound"] == 12.5
+    assert found["re_lt"]["fraction_of_upper_bound"] == pytest.approx(mean / 12.5)
+    assert "upper_bound" not in found["ja_lt"]
+
+
+@pytest.mark.slow
+def test_the_upper_bound_of_several_helpers_stands_beside_their_optimum() -> None:
+    two = dataclasses.replace(
+        SCENARIO, num_slots=2, helper_starts=((60.0, 60.0), (-60.0, -60.0)), fading=False
+    )
+    found = evaluate(two, "two", references(two, 50.0, Console(quiet=True)), FEW)
+    schemes = found.summary["schemes"]
+    for name in OPTIMA.values():
+        own = schemes[name]
+        assert own["upper_bound"] >= own["secrecy_sum_rate"]["mean"] - 1e-4
+    assert not {name for name, own in schemes.items() if "upper_bound" in own} - {*OPTIMA.values()}

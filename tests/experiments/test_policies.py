@@ -62,6 +62,6 @@ def test_an_actor_earns_in_the_evaluation_what_it_earned_in_training(tmp_path: P
 def test_the_references_are_two_straight_flights_no_helper_and_the_optima() -> None:
     fixed = {"re_lt", "ja_lt", "no_helper", "optimum", "re_optimum", "ja_optimum"}
     scenario = ONE_OF_EACH.scenario
-    assert set(references(scenario, 10.0, SILENT).policies) == {*fixed, "optimum_power"}
+    assert set(references(scenario, 10.0, SILENT)) == {*fixed, "optimum_power"}
     controlled = dataclasses.replace(scenario, power_control=True)
-    assert set(references(controlled, 20.0, SILENT).policies) == fixed
+    assert set(references(controlled, 20.0, SILENT)) == fixed

@@ -57,7 +57,7 @@ def trained_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = train(root / "tiny", asked, LoggerParameters(mode="disabled"), quiet)
     policies = {
         **learned_policies([run], SCENARIO),
-        **references(SCENARIO, 5.0, quiet).policies,
+        **references(SCENARIO, 5.0, quiet),
     }
     parameters = EvaluationParameters(episodes=4, flights=2)
     evaluate(SCENARIO, "two_clusters", policies, parameters).save(run.path)

@@ -34,6 +34,7 @@ from hyuav.envs.transforms import make_env
 from hyuav.experiments.schemes import SCHEMES
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario, as_scenario
+from hyuav.references.flight import FlightPolicy
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -88,7 +89,6 @@ def evaluate(
     *,
     track: Callable[[Sequence[str]], Iterable[str]] = iter,
     reward: Reward | Source | str = SUM_RATE,
-    upper_bounds: Mapping[str, float] | None = None,
 ) -> Evaluation:
     """Fly every scheme through the same draws of fading and tasks.
 
@@ -97,14 +97,13 @@ def evaluate(
         name: of the scenario, for the record.
         policies: by scheme, names of :data:`.schemes.SCHEMES`: one or more, as from several seeds,
             that write ``action``. Fractions of the optimum are given where the optima are among
-            them.
+            them, and of what no flight exceeds where an optimum's flight tells it
+            (:attr:`FlightPolicy.upper_bound`).
         parameters: how many episodes, how many of them kept slot by slot, and the seed.
         device: to fly on.
         track: passes on the schemes one by one, as what shows the progress does.
         reward: by which fractions of the optimum are told, and what is earned beside the secrecy
             sum-rate; as for :func:`hyuav.make_env`.
-        upper_bounds: by scheme of an optimum, what no flight under its mode rule earns, as
-            :attr:`hyuav.Optimum.upper_bound`; fractions of them are given too.
 
     Raises:
         InputError: no scheme, an unknown one, one without a policy, or a policy of another number
@@ -128,6 +127,12 @@ def evaluate(
         )
         for scheme in track([scheme for scheme in SCHEMES if scheme in by_scheme])
     }
+    bounds = {
+        scheme: own.upper_bound
+        for scheme, policies in by_scheme.items()
+        for own in policies
+        if isinstance(own, FlightPolicy) and own.upper_bound is not None
+    }
     told = {} if reward == DEFAULT else {"reward": {"name": reward.name, "unit": reward.unit}}
     summary = {
         "scenario": name,
@@ -136,7 +141,7 @@ def evaluate(
         "episodes": parameters.episodes,
         "seed": parameters.seed,
         "schemes": {
-            scheme: _returns(flown, scheme, upper_bounds or {}) | _account(flights.totals, scenario)
+            scheme: _returns(flown, scheme, bounds) | _account(flights.totals, scenario)
             for scheme, flights in flown.items()
         },
         **told,

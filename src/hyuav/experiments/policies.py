@@ -1,7 +1,6 @@
 """The ways to fly that an evaluation takes: the actors of trainings, and the references."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 from rich.console import Console
 from tensordict.nn import TensorDictModuleBase
@@ -105,18 +104,9 @@ def straight_policies(scenario: Scenario) -> tuple[Policies, list[str]]:
     return policies, left_out
 
 
-class References(NamedTuple):
-    """What flights are measured against."""
-
-    policies: Policies
-    upper_bounds: dict[str, float]
-    """By scheme of an optimum, where the optimum is not exact: what no flight earns, in the unit of
-    the reward."""
-
-
 def references(
     scenario: Scenario, resolution: float | None, console: Console, reward: Reward = DEFAULT
-) -> References:
+) -> Policies:
     """Re-LT, Ja-LT, no helper, and the optimum of each mode rule, where there is one.
 
     Of one helper it is exact on a grid; of several it is the best flight that was found, and the
@@ -134,11 +124,12 @@ def references(
         print_line(line, console)
     if (reason := why_no_optimum(reward, scenario)) is not None:
         print_line(f"reward = {reward.name}: {reason}", console)
-        return References(policies, {})
+        return policies
     with make_progress(console, "optima") as progress:
         optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
-        policies[OPTIMA[rule]] = [FlightPolicy(optimum.path, scenario, optimum.share)]
+        flight = FlightPolicy(optimum.path, scenario, optimum.share, optimum.upper_bound)
+        policies[OPTIMA[rule]] = [flight]
     if scenario.num_helpers == 1 and not scenario.power_control and reward == DEFAULT:
         controlled = SCHEMES[OPTIMUM_POWER].flown_in(scenario)
         spacing = max(resolution or RESOLUTION, POWER_RESOLUTION)
@@ -146,5 +137,4 @@ def references(
             found = solve_optimum(controlled, ["hybrid"], resolution=spacing, track=progress.track)
         best = found["hybrid"]
         policies[OPTIMUM_POWER] = [FlightPolicy(best.path, controlled, best.share)]
-    bounds = {OPTIMA[rule]: optimum.upper_bound for rule, optimum in optima.items()}
-    return References(policies, {name: own for name, own in bounds.items() if own is not None})
+    return policies

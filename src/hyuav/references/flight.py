@@ -26,6 +26,8 @@ class FlightPolicy(TensorDictModuleBase):
         scenario: whose speed, slot duration and power range the environment has, or the name of a
             preset.
         power: (T, H), in units of the nominal power, such as :attr:`Optimum.share`; None for that.
+        upper_bound: of what any flight earns, such as :attr:`Optimum.upper_bound`, to be told
+            beside what this one does; None where it is not known.
 
     Raises:
         InputError: a path of another shape.
@@ -41,9 +43,14 @@ class FlightPolicy(TensorDictModuleBase):
     out_keys = ("action",)
 
     def __init__(
-        self, path: Tensor | ArrayLike, scenario: ScenarioLike, power: Tensor | None = None
+        self,
+        path: Tensor | ArrayLike,
+        scenario: ScenarioLike,
+        power: Tensor | None = None,
+        upper_bound: float | None = None,
     ) -> None:
         super().__init__()
+        self.upper_bound = upper_bound
         scenario, given = as_scenario(scenario), path
         accepted = f"positions in m of shape (T + 1, {scenario.num_helpers}, 2)"
         try:

@@ -27,6 +27,7 @@ from hyuav.learning.registry import PEER
 from hyuav.learning.training import Training, TrainingParameters
 from hyuav.references import bounds
 from hyuav.references.optimum import solve_optimum
+from hyuav.references.straight import no_helper
 
 TRAINING = TrainingParameters(
     num_episodes=5,
@@ -122,6 +123,8 @@ def test_learners_are_set_beside_the_optimum(optima: Optima, tmp_path: Path) -> 
     optimum = float(flights.totals["secrecy_sum_rate"].mean())
     assert results["optimum"][0] == optimum
     assert results["fraction"][1] == 2.0 / optimum
+    alone = fly(SCENARIO, "no_helper", no_helper(SCENARIO), EVALUATION).totals["secrecy_sum_rate"]
+    assert results["no_helper"].tolist() == [float(alone.mean())] * 4
     assert results["episodes_to_threshold"].tolist()[1] == 4
     assert results["seconds_to_threshold"].tolist()[1] == 2.0
     assert results["episodes_to_threshold"].isna().tolist() == [True, False, True, True]

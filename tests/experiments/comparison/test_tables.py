@@ -25,6 +25,8 @@ def printed(algorithms: list[str], capsys: pytest.CaptureFixture[str]) -> list[s
                 "scheme": "relay",
                 "num_slots": 10,
                 "seed": seed,
+                "optimum": 59.5,
+                "no_helper": 388.3,
                 "fraction": 0.9 + 0.01 * place + 0.001 * seed,
                 "episodes_to_threshold": 100.0,
                 "seconds_to_threshold": 1.0,
@@ -42,6 +44,8 @@ def printed(algorithms: list[str], capsys: pytest.CaptureFixture[str]) -> list[s
     lines = capsys.readouterr().out.splitlines()
     pairs = next(i for i, line in enumerate(lines) if "P(row" in line)
     assert max(len(line.rstrip()) for line in lines) <= 80
+    (alone,) = (line for line in lines[:pairs] if line.startswith(" No helper"))
+    assert alone.split() == ["No", "helper", "relay", "652.6"]
     return lines[pairs:]
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from rich.console import Console
 
 from hyuav import Scenario
@@ -15,6 +16,7 @@ from hyuav.experiments.train import train
 from hyuav.learning.ddpg import DDPG
 from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
+from hyuav.references.flight import FlightPolicy
 from hyuav.references.straight import ja_lt, re_lt
 from offline_wandb import history, offline_runs, recorded, summary
 from recipe_calls import TINY_COMPARISON, TINY_TRAINING, Call
@@ -47,9 +49,10 @@ def table(directory: Path, record: dict[str, Any], name: str) -> dict[str, Any]:
 
 def test_each_of_several_helpers_is_logged_with_the_upper_bound(tmp_path: Path) -> None:
     two = dataclasses.replace(Scenario.preset("contested"), num_slots=5)
-    parameters, bounds = EvaluationParameters(episodes=3, flights=1), {"ja_optimum": 100.0}
-    flown = {"ja_lt": ja_lt(two)}
-    evaluation = evaluate(two, "contested", flown, parameters, upper_bounds=bounds)
+    parameters = EvaluationParameters(episodes=3, flights=1)
+    path = torch.zeros(two.num_slots + 1, 2, 2)
+    best = FlightPolicy(path, two, upper_bound=100.0)
+    evaluation = evaluate(two, "contested", {"ja_lt": ja_lt(two), "ja_optimum": best}, parameters)
     logger = EvaluationLoggerParameters(mode="offline")
     log_evaluation(tmp_path, evaluation, [], logger, SILENT)
     (file,) = offline_runs(tmp_path)

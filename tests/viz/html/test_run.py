@@ -28,7 +28,7 @@ def _sections(page: Page) -> dict[str, Section]:
 def shorter(trained: RunDirectory) -> Evaluation:
     """Over eight slots, where the run's own evaluation is over twelve."""
     scenario = dataclasses.replace(trained.configuration().scenario, num_slots=8)
-    policies = references(scenario, 10.0, Console(quiet=True)).policies
+    policies = references(scenario, 10.0, Console(quiet=True))
     return evaluate(scenario, "two_clusters", policies, EvaluationParameters(episodes=4, flights=1))
 
 

@@ -1,6 +1,7 @@
 import pandas as pd
 
 from hyuav import Scenario
+from hyuav._support.formatting import interval
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.viz.data.reading import readable_evaluation
 from hyuav.viz.html.tables import cells_table, configuration_tables, html_table, scheme_table
@@ -25,6 +26,7 @@ def test_whatever_was_read_from_a_file_is_escaped() -> None:
             "high": [0.9],
             "median_episodes_to_threshold": [float("inf")],
             "median_seconds_to_threshold": [2.0],
+            "no_helper": [6.5],
         }
     )
     config = {HOSTILE: {HOSTILE: [HOSTILE, {HOSTILE: HOSTILE}]}, "plain": HOSTILE}
@@ -44,7 +46,8 @@ def test_every_scheme_has_a_row_with_its_interval(evaluated: RunDirectory) -> No
     table = scheme_table(summary)
     for result in summary["schemes"].values():
         rate = result["secrecy_sum_rate"]
-        assert "{:.2f} [{:.2f}, {:.2f}]".format(rate["mean"], *rate["ci95"]) in table
+        digits = 1 if rate["mean"] >= 100.0 else 2
+        assert interval(rate["mean"], *rate["ci95"], digits=digits) in table
     assert table.count("<tr>") == len(summary["schemes"]) + 1
 
 

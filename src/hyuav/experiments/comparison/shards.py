@@ -21,16 +21,17 @@ from hyuav.experiments.evaluation import EvaluationParameters, fly
 from hyuav.experiments.metrics import METRIC_NUMBERS
 from hyuav.experiments.policies import learned_policies
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
-from hyuav.experiments.schemes import LEARNED, OPTIMA
+from hyuav.experiments.schemes import LEARNED, NO_HELPER, OPTIMA
 from hyuav.experiments.tracking import LoggerParameters, in_group
 from hyuav.experiments.train import resume, train
 from hyuav.learning.registry import PEER
+from hyuav.references.straight import no_helper
 
 TABLES = RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
 
 _IDENTITY = {"algorithm", "scenario", "scheme", "num_slots", "seed"}
 _RESULTS = _IDENTITY | {
-    *("sum_rate", "optimum", "fraction", "seconds"),
+    *("sum_rate", "optimum", "no_helper", "fraction", "seconds"),
     *("episodes_to_threshold", "seconds_to_threshold"),
 }
 _CURVES = _IDENTITY | {"episode", "slots", "seconds", "best_sum_rate", "fraction"}
@@ -216,6 +217,7 @@ class Shard:
             ``results``, a row for each learner: ``sum_rate``, what it ``earned``, the ``optimum``
             of its mode rule in the same episodes, and the ratio of both, ``fraction``; where the
             optimum is only the best flight that was found, ``upper_bound``, what no flight earns;
+            what comes with ``no_helper`` there;
             ``episodes_to_threshold`` and ``seconds_to_threshold`` at the first evaluation at which
             the best weights so far earned the threshold's share of what the optimum earns in that
             evaluation's episodes, NaN where none did; ``seconds`` in all; and ``stopped``, the
@@ -227,6 +229,7 @@ class Shard:
         episodes = self.configuration.training.num_episodes
         in_training = self._optima(training_episodes(self.configuration.training))
         in_evaluation = self._optima(self.evaluation)
+        alone = self._without_helper()
         results, curves = [], []
         for index, learner in enumerate(self.configuration.learners):
             identity: dict[str, Any] = {
@@ -249,6 +252,7 @@ class Shard:
                     "earned": earned[index],
                     "optimum": optimum,
                     **({} if bound is None else {"upper_bound": bound}),
+                    "no_helper": alone,
                     "fraction": earned[index] / optimum,
                     **_first_solved(curve, self.threshold),
                     "seconds": own["seconds"].iloc[-1] if len(own) else 0.0,
@@ -257,6 +261,12 @@ class Shard:
             )
             curves.append(curve.assign(**identity)[[*identity, *curve.columns]])
         return pd.DataFrame(results), pd.concat(curves, ignore_index=True)
+
+    def _without_helper(self) -> float:
+        """What comes without a helper in the evaluation's episodes, by the reward."""
+        scenario, reward = self.configuration.scenario, self.configuration.reward
+        flights = fly(scenario, NO_HELPER, no_helper(scenario), self.evaluation, reward=reward)
+        return float(flights.earned.mean())
 
     def _optima(self, episodes: EvaluationParameters) -> Mapping[str, float]:
         """What the best flight of each learner's mode rule earns in these episodes.

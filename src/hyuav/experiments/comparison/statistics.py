@@ -55,7 +55,9 @@ def summarize_cells(results: pd.DataFrame, threshold: float) -> pd.DataFrame:
         by ``algorithm``, ``scenario``, ``scheme`` and ``num_slots``: the number of ``learners``;
         the fraction's ``iqm``, its interval ``low`` to ``high`` and the ``worst``;
         ``above_threshold``, the share of learners; and the medians of the episodes and seconds
-        until the threshold was reached, inf where half of the learners or more never did.
+        until the threshold was reached, inf where half of the learners or more never did; and
+        ``no_helper``, the mean share of the optimum that comes without a helper, NaN where older
+        results do not tell it.
     """
     rows = []
     for identity, cell in in_cells(results).groupby(["algorithm", *_CELL], sort=False):
@@ -64,7 +66,9 @@ def summarize_cells(results: pd.DataFrame, threshold: float) -> pd.DataFrame:
             f"median_{column}": np.median(cell[column].fillna(np.inf))
             for column in ("episodes_to_threshold", "seconds_to_threshold")
         }
-        rows.append(names | _described([cell["fraction"].to_numpy()], threshold) | medians)
+        alone = {"no_helper": without_helper(cell)}
+        described = _described([cell["fraction"].to_numpy()], threshold)
+        rows.append(names | described | medians | alone)
     return pd.DataFrame(rows)
 
 
@@ -75,7 +79,8 @@ def summarize_algorithms(results: pd.DataFrame, threshold: float) -> pd.DataFram
         by ``algorithm``: the number of ``learners``; the fraction's ``iqm`` with its stratified
         interval ``low`` to ``high``, ``worst`` and ``median``; ``above_threshold`` and
         ``near_optimal``, the shares of learners that reach the threshold and
-        :data:`NEAR_OPTIMAL`; and ``seconds``, the median that a learner took.
+        :data:`NEAR_OPTIMAL`; ``seconds``, the median that a learner took; and ``no_helper``, as
+        :func:`summarize_cells` tells it.
     """
     return pd.DataFrame(
         {
@@ -84,9 +89,21 @@ def summarize_algorithms(results: pd.DataFrame, threshold: float) -> pd.DataFram
             "median": own["fraction"].median(),
             "near_optimal": (own["fraction"] >= NEAR_OPTIMAL).mean(),
             "seconds": own["seconds"].median(),
+            "no_helper": without_helper(own),
         }
         for algorithm, own in in_cells(results).groupby("algorithm", sort=False)
     )
+
+
+def without_helper(results: pd.DataFrame) -> float:
+    """The mean share of the optimum that comes without a helper; NaN where it is not told.
+
+    Args:
+        results: a row for each learner.
+    """
+    if "no_helper" not in results:
+        return float("nan")
+    return float((results["no_helper"] / results["optimum"]).mean())
 
 
 def _described(cells: Sequence[Array], threshold: float) -> dict[str, Any]:

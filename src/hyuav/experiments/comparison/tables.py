@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from rich.console import Console
 from rich.table import Table
@@ -13,6 +14,7 @@ from hyuav._support.terminal import print_line, print_table, results_table
 from hyuav.experiments.comparison.statistics import NEAR_OPTIMAL
 from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.metrics import finite_numbers
+from hyuav.experiments.schemes import LABELS, NO_HELPER
 from hyuav.learning.registry import PEER
 
 LABEL_WIDTH = 14
@@ -120,6 +122,9 @@ def _cells(name: str, cells: pd.DataFrame, threshold: float) -> Table:
                 or_never(cell["median_episodes_to_threshold"], 0),
                 or_never(cell["median_seconds_to_threshold"], 1),
             )
+        if np.isfinite(own["no_helper"].iloc[0]):
+            share = f"{100 * own['no_helper'].mean():.1f}"
+            table.add_row(LABELS[NO_HELPER], str(scheme), share, *[""] * 4)
     return table
 
 

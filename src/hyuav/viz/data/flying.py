@@ -135,12 +135,13 @@ def flown(
         InputError: as :func:`resolution`, or the checkpoint does not fit the scenario.
     """
     best = optimum(scenario, rule, fine=fine)
-    policies: Policies = {OPTIMA[rule]: [FlightPolicy(best.path, scenario, best.share)]}
-    policies[NO_HELPER] = [no_helper(scenario)]
+    policies: Policies = {
+        OPTIMA[rule]: [FlightPolicy(best.path, scenario, best.share, best.upper_bound)],
+        NO_HELPER: [no_helper(scenario)],
+    }
     if checkpoint is not None:
         policies[LEARNED[rule]] = [_policy(scenario, checkpoint)]
-    bounds = {} if best.upper_bound is None else {OPTIMA[rule]: best.upper_bound}
-    return evaluate(scenario, "changed", policies, EPISODES, upper_bounds=bounds)
+    return evaluate(scenario, "changed", policies, EPISODES)
 
 
 @lru_cache(maxsize=64)

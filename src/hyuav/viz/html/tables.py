@@ -14,6 +14,7 @@ from hyuav.experiments.evaluation_table import (
     is_bounded,
     upper_bounds,
 )
+from hyuav.experiments.schemes import NO_HELPER
 from hyuav.viz.data.configuration import SYMBOLS, entries
 from hyuav.viz.data.schemes import scheme_color, scheme_label
 
@@ -104,12 +105,14 @@ def cells_table(cells: pd.DataFrame, threshold: float) -> Markup:
             percent(cell["above_threshold"], 0),
             or_never(cell["median_episodes_to_threshold"], 0),
             or_never(cell["median_seconds_to_threshold"], 1),
+            percent(cell["no_helper"]) if pd.notna(cell["no_helper"]) else "-",
         )
         for _, cell in cells.iterrows()
     ]
     headings = (
         *("Algorithm", "Scenario", "Scheme", "T", "Learners", "IQM (%)", "95 % interval"),
         *("Worst (%)", f"reach {percent(threshold, None)}", "Episodes until then", "Seconds (s)"),
+        scheme_label(NO_HELPER),
     )
     caption = "Share of the optimum: interquartile mean (IQM) over the learners of each cell"
     return html_table(caption, headings, rows, text=3)
