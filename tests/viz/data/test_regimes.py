@@ -32,7 +32,7 @@ def test_the_simplest_scheme_that_comes_near_the_best_is_named(tmp_path: Path) -
     assert shares.loc["nothing", "share"] == pytest.approx(2 / 6)
     told = {"no_helper": "3.00", "jamming": "∞", "hybrid": "1.50", "nothing": "-"}
     for name, text in told.items():
-        assert times(shares.loc[name, "factor"]) == text
+        assert times(float(shares["factor"][name])) == text
 
 
 def test_rows_are_y_and_columns_are_x(tmp_path: Path) -> None:
