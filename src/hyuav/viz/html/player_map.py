@@ -192,7 +192,7 @@ def _uavs(positions: Sequence[Point], label: str, symbol: str, color: str) -> Tr
         x=x,
         y=y,
         text=called,
-        textposition="bottom right",
+        textposition="top left" if letter == "H" else "bottom right",  # a jammer is near E
         textfont={"size": 11, "color": color, "weight": "bold"},
         name=label,
         mode="markers" if len(positions) == 1 else "markers+text",
