@@ -132,7 +132,7 @@ def reference_policies(
         controlled = SCHEMES[OPTIMUM_POWER].flown_in(scenario)
         spacing = max(resolution or RESOLUTION, POWER_RESOLUTION)
         with make_progress(console, "optimum, power") as progress:
-            tracked = {"resolution": spacing, "track": progress.track}
-            best = solve_optimum(controlled, ["hybrid"], **tracked)["hybrid"]
+            found = solve_optimum(controlled, ["hybrid"], resolution=spacing, track=progress.track)
+        best = found["hybrid"]
         policies[OPTIMUM_POWER] = [FlightPolicy(best.path, controlled, best.share)]
     return policies

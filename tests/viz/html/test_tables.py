@@ -47,7 +47,8 @@ def test_every_scheme_has_a_row_with_its_interval(evaluated: RunDirectory) -> No
     for result in summary["schemes"].values():
         rate = result["secrecy_sum_rate"]
         digits = 1 if rate["mean"] >= 100.0 else 2
-        assert interval(rate["mean"], *rate["ci95"], digits) in table
+        low, high = rate["ci95"]
+        assert interval(rate["mean"], low, high, digits) in table
     assert table.count("<tr>") == len(summary["schemes"]) + 1
 
 

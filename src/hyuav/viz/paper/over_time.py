@@ -44,9 +44,8 @@ def energy_by_slot(table: pd.DataFrame) -> Figure:
         with_power = "power_level" in table
         figure = Figure(figsize=(COLUMN_WIDTH, 5.0 + 1.3 * with_power), layout="constrained")
         ratios = (1.5, 1, 1, 1) if with_power else (1.5, 1, 1)
-        of_ues, of_edge, of_helper, *of_power = figure.subplots(
-            len(ratios), sharex=True, height_ratios=ratios
-        )
+        panels: list[Axes] = list(figure.subplots(len(ratios), sharex=True, height_ratios=ratios))
+        of_ues, of_edge, of_helper, *of_power = panels
         budget = 1e3 * ues[0]["budget"].iloc[0]
         image = _by_ue(of_ues, [1e3 * rows["energy"] for rows in ues], budget)
         label = f"Energy of each UE, {scheme_label(scheme)} (mJ; budget {budget:g} mJ)"
@@ -61,8 +60,7 @@ def energy_by_slot(table: pd.DataFrame) -> Figure:
             axes.set_axisbelow(True)
         for axes in of_power:
             _power_by_slot(axes, nodes["H"])
-        (*_, lowest) = (of_helper, *of_power)
-        lowest.set_xlabel("Slot")
+        panels[-1].set_xlabel("Slot")
         handles, _ = of_edge.get_legend_handles_labels()
         budget_line = Line2D([], [], color="0.3", linewidth=0.9, linestyle="dashdot")
         budget_line.set_label("budget per slot")
