@@ -80,8 +80,12 @@ def test_upper_bounds_are_told_below_the_table() -> None:
 
 def test_more_than_a_hundred_and_more_than_ten_times_the_optimum_stay_within_80_columns() -> None:
     rate = {"mean": 771.52, "ci95": [771.28, 771.81]}
-    more: dict[str, Any] = {"fraction_of_optimum": 1.0, "fraction_of_hybrid_optimum": 12.896}
-    lines = printed(secrecy_sum_rate=rate, **more, scheme="proposed_power")
+    lines = printed(
+        scheme="proposed_power",
+        secrecy_sum_rate=rate,
+        fraction_of_optimum=1.0,
+        fraction_of_hybrid_optimum=12.896,
+    )
     row = next(line for line in lines if line.lstrip().startswith("Proposed, power"))
     assert row.split()[2:7] == ["771.5", "[771.3,", "771.8]", "100.0", "%"]
     assert row.split()[7:9] == ["1290", "%"]

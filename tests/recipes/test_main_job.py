@@ -39,7 +39,7 @@ def test_the_figures_of_several_layouts_and_horizons_come_from_one_command(
         *("animation.gif", "trajectories_nodes.csv", "flight_map_nodes.csv")
     }
     horizons = pd.read_csv(job / "figures" / "horizons.csv")
-    assert horizons.groupby("num_slots")["scheme"].count().to_dict() == {8: 10, 10: 10}
+    assert horizons.groupby("num_slots")["scheme"].count().to_dict() == {8: 11, 10: 10}
     proposed = horizons[horizons["scheme"] == "proposed"].set_index("num_slots")
     assert proposed["learners"].to_dict() == {8: 2, 10: 1}
     beside = RunDirectory(job / "random_disk")
