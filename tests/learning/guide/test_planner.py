@@ -5,7 +5,7 @@ import dataclasses
 
 import pytest
 import torch
-from tensordict import TensorDict, TensorDictBase, lazy_stack
+from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 
 from hyuav import Guide, InputError, RobustDDPG, RobustSAC, RobustTD3, Scenario, make_env
@@ -97,7 +97,7 @@ def test_of_the_powers_that_are_tried_the_best_is_kept_and_that_of_the_best_gues
     env = make_env(scenario, ["hybrid"] * 2, (2,), seed=[1, 2], clock=True)
     planning, action = Planner(GUIDE, RobustDDPG(guide=GUIDE), env, [1, 2]), torch.zeros(2, 6)
     slots = [env.step(env.reset().set("action", action)) for _ in range(6)]
-    flown = lazy_stack(slots).select("action", ("next", "observation"), ("next", "reward"))
+    flown = TensorDict.stack(slots).select("action", ("next", "observation"), ("next", "reward"))
     for episode in range(4, 16):
         planning.end_episode(episode, flown, flown)
     flights = planning.flights
