@@ -16,7 +16,7 @@ def test_a_map_shows_the_rates_on_one_scale(mode: Mode) -> None:
     heat = sum_rate_map(SCENARIO, mode, 10.0).data[0]
     np.testing.assert_allclose(heat.z, rates[mode], rtol=1e-6)
     assert (heat.zmin, heat.zmax) == (0.0, rates["better"].max())
-    assert heat.colorbar.title.text == "Secrecy sum-rate (bps/Hz); without a helper 18.52"
+    assert heat.colorbar.title.text == "Secrecy sum-rate (bps/Hz)<br>without a helper 18.52"
 
 
 @pytest.mark.parametrize("preset", ["random_disk", "two_clusters"])

@@ -46,7 +46,7 @@ def map_figure(scenario: Scenario, brings: HelperMap, mode: Mode) -> go.Figure:
         zmax=max(float(rates["better"].max()), 1e-6),
         colorscale="Viridis",
         colorbar={
-            "title": {"text": f"Secrecy sum-rate{of_one} (bps/Hz); {alone}", "side": "bottom"},
+            "title": {"text": f"Secrecy sum-rate (bps/Hz){of_one}<br>{alone}", "side": "bottom"},
             "orientation": "h",
             "thickness": 12,
             "y": -0.16,
@@ -60,8 +60,8 @@ def map_figure(scenario: Scenario, brings: HelperMap, mode: Mode) -> go.Figure:
     _add_nodes(figure, scenario)
     figure.update_layout(
         title={"text": TITLES[mode], "x": 0.5, "xanchor": "center", "font": {"size": 14}},
-        height=480,
-        margin={"l": 50, "r": 15, "t": 35, "b": 125},
+        height=495,
+        margin={"l": 50, "r": 15, "t": 35, "b": 140},
         showlegend=False,
         **square_map(scenario.map_side / 2),
     )
