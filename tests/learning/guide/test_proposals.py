@@ -100,19 +100,3 @@ def test_variations_lead_beside_the_flights_that_they_vary() -> None:
     first, last = moved[0].float().mean(), moved[-1].float().mean()
     assert min(first, last) > 0.3  # some from the first slot on, some to the last
     assert (~moved.all(dim=0)).float().mean() > 0.3  # and most not all along
-
-
-def test_of_several_helpers_each_in_turn_flies_elsewhere_and_then_all() -> None:
-    starts = ((-60.0, -60.0), (60.0, -60.0))
-    scenario = dataclasses.replace(SCENARIO, helper_starts=starts)
-    known = flights(scenario)
-    _, trajectory = proposing(60, scenario).fly(1, known, normals(60, 2))
-    straight, of_best, of_planned = trajectory.split((60, 30, 30), dim=2)
-    for varied, model in (
-        (straight, known.trajectory),
-        (of_best, known.trajectory),
-        (of_planned, known.planned_trajectory),
-    ):
-        away = (varied - model.unsqueeze(2)).abs().unflatten(-1, (2, 2)).amax(dim=(0, 1, 4)) > 1e-6
-        moved = away.unflatten(0, (-1, 3)).any(dim=0)
-        assert moved.tolist() == [[True, False], [False, True], [True, True]]

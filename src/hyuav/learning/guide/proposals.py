@@ -21,9 +21,6 @@ class TrajectoryProposals:
     found out by flying it. From episode to episode the places fill the map evenly; a variation
     displaces some slots in a row of a flight, by metres or by as far as can be flown in a slot.
 
-    Of several helpers each in turn flies elsewhere while the others fly as in a good flight, and
-    then all do: what one alone can do better is found in two dimensions, not in 2 H.
-
     Args:
         guide: its parameters: D straight flights are imagined, and as many variations.
         physics: of the scenario that is flown.
@@ -36,13 +33,9 @@ class TrajectoryProposals:
         self._places = torch.arange(flights, dtype=torch.float64, device=physics.device)
         limit = physics.norm_limit(schemes)
         self._norm_limit = None if limit is None else limit[:, None, :, None]
-        scenario = physics.scenario
+        self._learners, scenario = len(schemes), physics.scenario
         self._by_helper = scenario.num_helpers, scenario.action_size
         self._multiples = evenly(2 * scenario.num_helpers)
-        helper = torch.arange(scenario.num_helpers, device=physics.device)
-        turn = torch.arange(flights, device=physics.device) % (scenario.num_helpers + 1)
-        turn = turn.reshape(-1, 1, 1)
-        self._moves = (turn == helper.unsqueeze(-1)) | (turn == scenario.num_helpers)
         self.normals = (flights, 3 + 2 * scenario.num_helpers)
         """Shape of the standard normal numbers that make the variations of one learner."""
         self._half_side = scenario.map_side / 2
@@ -60,7 +53,7 @@ class TrajectoryProposals:
             the actions (T, N, 2 D, actions), and where they lead.
         """
         varied, powers = self._variations(flights, normals)
-        towards = torch.cat([self._straight(episode, flights), varied], dim=2)
+        towards = torch.cat([self._straight(episode), varied], dim=2)
         power = torch.cat([powers[:, :, :1].expand_as(powers), powers], dim=2)
         position = self._physics.nodes.helper.expand(*towards.shape[1:])
         actions, trajectory = [], []
@@ -72,15 +65,14 @@ class TrajectoryProposals:
             trajectory.append(torch.cat([position / self._half_side, own], dim=-1).flatten(-2))
         return torch.stack(actions), torch.stack(trajectory)
 
-    def _straight(self, episode: int, flights: Demonstrations) -> Tensor:
+    def _straight(self, episode: int) -> Tensor:
         """Where to fly in each slot: (T, N, D, H, 2)."""
         places = self._places + len(self._places) * episode
         share = torch.stack([torch.frac(places * each) for each in self._multiples], dim=-1)
         spread = self._guide.destination_spread
         ends = destinations(share.to(self._physics.dtype), spread) * WITHIN
         ends = ends.unflatten(-1, (-1, 2))
-        known = flights.trajectory.unflatten(-1, self._by_helper)[..., :2].unsqueeze(2)
-        return torch.where(self._moves, ends, known.nan_to_num(0.0).clamp(-WITHIN, WITHIN))
+        return ends.expand(self._physics.scenario.num_slots, self._learners, *ends.shape)
 
     def _variations(self, flights: Demonstrations, normals: Tensor) -> tuple[Tensor, Tensor]:
         """The same of variations, and their powers (T, N, D, H, 1 or 0)."""
@@ -98,5 +90,5 @@ class TrajectoryProposals:
         displacement = displaced.unsqueeze(-1) * (size.unsqueeze(-1) * normals[..., 3:])
         places = torch.cat([of_best, of_planned], dim=2).unflatten(-1, self._by_helper)
         position, power = places.nan_to_num(0.0).tensor_split([2], dim=-1)
-        position = position + self._moves * displacement.view_as(position)
+        position = position + displacement.view_as(position)
         return position.clamp(-WITHIN, WITHIN), power
