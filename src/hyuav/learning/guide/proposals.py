@@ -89,6 +89,6 @@ class TrajectoryProposals:
         size[:, 0] = 0.0
         displacement = displaced.unsqueeze(-1) * (size.unsqueeze(-1) * normals[..., 3:])
         places = torch.cat([of_best, of_planned], dim=2).unflatten(-1, self._by_helper)
-        position, power = places.nan_to_num(0.0).tensor_split([2], dim=-1)
-        position = position + displacement.view_as(position)
-        return position.clamp(-WITHIN, WITHIN), power
+        position, power = places.tensor_split([2], dim=-1)
+        position = (position + displacement.view_as(position)).nan_to_num(0.0)
+        return position.clamp(-WITHIN, WITHIN), power.nan_to_num(0.0)
