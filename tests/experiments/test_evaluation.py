@@ -313,6 +313,8 @@ def test_the_power_along_the_flight_is_kept_where_a_scheme_chooses_it() -> None:
     assert level.count().to_dict() == {"optimum_power": 2 * SCENARIO.num_slots, "re_lt": 0}
     own = level.get_group("optimum_power").to_numpy()[: SCENARIO.num_slots]
     np.testing.assert_allclose(own, np.linspace(0.0, -60.0, SCENARIO.num_slots), atol=1e-3)
+    silent = evaluate(controlled, "power", {"no_helper": no_helper(controlled)}, FEW)
+    assert "power_level" not in silent.flights
 
 
 def test_fractions_of_upper_bounds_are_of_each_mode_rules_own() -> None:

@@ -83,7 +83,7 @@ def test_several_helpers_are_trained_evaluated_and_drawn(
 REFUSALS = {
     "num_slots=20": "num_slots = 20: expected what learners were trained for, 8\n",
     "scenario.ue_positions=[[0,1]]": "number of UEs = 1: expected 10, for which the checkpoint was",
-    "scenario=square": "scenario = 'square': expected one of as_trained, clusters, disk, ",
+    "scenario=square": "scenario = 'square': expected one of as_trained, clusters, contested, ",
     "scenario.jamming_power=-1": "jamming_power = -1: expected a number in [0, 1e+06]",
     "scenario.num_slots=0": "num_slots = 0: expected a whole number >= 1",
 }

@@ -31,7 +31,7 @@ from hyuav._support.randomness import derived_seed
 from hyuav.envs.reward import Reward, Source
 from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.envs.transforms import make_env
-from hyuav.experiments.schemes import SCHEMES
+from hyuav.experiments.schemes import SCHEMES, Kind
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario, as_scenario
 from hyuav.references.flight import FlightPolicy
@@ -222,7 +222,7 @@ def fly(
         for name, values in found.items():
             totals[name] = totals[name] + values if name in totals else values.double()
         kept = flown["next"][0, : parameters.flights].cpu()
-        if flown_in.power_control:
+        if flown_in.power_control and own.kind is not Kind.NO_HELPER:
             kept["power_level"] = power_level(flown["action"][0, : parameters.flights], flown_in)
         slots.append(kept)
         state = env.step_mdp(flown)

@@ -42,9 +42,8 @@ def sum_rate_maps(scenario: Scenario, table: pd.DataFrame) -> Figure:
             image = axes.imshow(
                 rates, origin="lower", extent=extent, cmap="viridis", vmin=0.0, vmax=better.max()
             )
-        of_one = " of one helper" if scenario.num_helpers > 1 else ""
-        alone = f"without a helper {table[NO_HELPER].iloc[0]:.2f}"
-        label = f"Secrecy sum-rate{of_one} (bps/Hz); {alone}"
+        of_one = " of one helper alone (bps/Hz);\n" if scenario.num_helpers > 1 else " (bps/Hz); "
+        label = f"Secrecy sum-rate{of_one}without a helper {table[NO_HELPER].iloc[0]:.2f}"
         figure.colorbar(image, ax=panels, location="top", label=label, aspect=35)
         colors = ListedColormap(list(MODE_COLORS.values()))
         panels[3].imshow(chosen, origin="lower", extent=extent, cmap=colors, vmin=-0.5, vmax=2.5)
