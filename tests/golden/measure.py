@@ -6,12 +6,11 @@ Each part is measured, and its numbers are kept, by its name (in seconds of one 
     python tests/golden/measure.py rollouts            #   5: all that environments tell
     python tests/golden/measure.py trainings           #  35: every algorithm, slot by slot
     python tests/golden/measure.py optima              #  10: the best flights
-    python tests/golden/measure.py compiled_rollouts   #  40
     python tests/golden/measure.py compiled_trainings  # 120
     python tests/golden/measure.py job                 #  20: the main job, as small as can be
 
 ``pytest tests/golden`` compares the first parts with what was kept, ``pytest -m slow tests/golden``
-the last three. Kept are SHA-256 digests of the bytes of tensors, whatever axes of length 1 they
+the last two. Kept are SHA-256 digests of the bytes of tensors, whatever axes of length 1 they
 have, and numbers in full precision. Parts and functions of the program are looked up when they
 are needed, so that one that is missing fails its own part alone.
 """
@@ -149,13 +148,12 @@ def actions() -> Tensor:
     return drift + 0.6 * torch.randn(SLOTS, BATCH, 2, generator=generator)
 
 
-def rollouts(names: Sequence[str] = tuple(VARIANTS), *, compiled: bool = False) -> dict[str, Any]:
+def rollouts() -> dict[str, Any]:
     """Digests of everything that an environment tells of a flight, by entry."""
     measured: dict[str, Any] = {}
-    for name in names:
-        changes, mode, seed, options = VARIANTS[name]
+    for name, (changes, mode, seed, options) in VARIANTS.items():
         flown = scenario("two_clusters", num_slots=SLOTS, **changes)
-        env = hyuav.make_env(flown, mode, (BATCH,), None, seed, True, **options, compiled=compiled)
+        env = hyuav.make_env(flown, mode, (BATCH,), None, seed, True, **options)
         state = env.reset()
         after = [state.clone()]
         for action in actions():
@@ -183,11 +181,6 @@ def entries(told: TensorDictBase, num_ues: int) -> Iterator[tuple[str, str]]:
             columns = named[whole].split(sizes, dim=-1)
             for part, values in zip(parts, columns, strict=True):
                 yield f"{whole}.{part}", digest(values)
-
-
-def compiled_rollouts() -> dict[str, Any]:
-    """Some of the flights, each slot one compiled program."""
-    return rollouts(("hybrid, fading True", "relay, fading False", "seeds of rows"), compiled=True)
 
 
 def trainings() -> dict[str, Any]:
@@ -271,8 +264,7 @@ def job() -> dict[str, Any]:
 
 
 PARTS: dict[str, Callable[[], dict[str, Any]]] = {
-    part.__name__: part
-    for part in (rewards, rollouts, trainings, optima, compiled_rollouts, compiled_trainings, job)
+    part.__name__: part for part in (rewards, rollouts, trainings, optima, compiled_trainings, job)
 }
 
 

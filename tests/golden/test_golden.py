@@ -9,7 +9,7 @@ import pytest
 from golden.measure import GOLDEN, PARTS, arithmetic, measure
 
 KEPT = json.loads(GOLDEN.read_text())
-SLOW = ("compiled_rollouts", "compiled_trainings", "job")
+SLOW = ("compiled_trainings", "job")
 NAMES = [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in PARTS]
 
 
