@@ -16,7 +16,7 @@ from hyuav.experiments.schemes import LABELS
 from hyuav.learning.ddpg import DDPG
 from recipe_calls import TINY, Call, Refusal
 
-NAMES = "ddpg, ddpg_robust, sac, sac_robust, td3, td3_robust"
+NAMES = "ddpg, ddpg_robust, maddpg, sac, sac_robust, td3, td3_robust"
 RECIPES = Path(__file__).parents[2] / "recipes"
 SHORT = (*TINY, "scenario.num_slots=10")
 FEW = ("evaluation.episodes=4", "evaluation.resolution=10")
