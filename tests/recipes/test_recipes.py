@@ -301,7 +301,10 @@ REFUSALS = [
     ),
     (["train", "algorithm=[ddpg,td3]"], f"algorithm = '[ddpg,td3]': expected one of {NAMES}"),
     (["reproduce", "algorithm=[ddpg,td3]"], f"algorithm = '[ddpg,td3]': expected one of {NAMES}"),
-    (["train", "~scenario"], "~scenario = '': expected one of clusters, disk, random_disk"),
+    (
+        ["train", "~scenario"],
+        "~scenario = '': expected one of clusters, contested, disk, random_disk",
+    ),
     (["train", "scenario=disk", "scenario.num_ues=0"], "num_ues = 0: expected a whole number >= 1"),
     (["train", "scenario=disk", "scenario.radius=101"], "radius = 101.0: expected center + radius"),
     (["train", "scenario=disk", "scenario.seed=-1"], "seed = -1: expected a whole number >= 0"),
