@@ -78,9 +78,24 @@ class ObservationLayout:
         position = self.position(slots["next", "observation"])
         if not self.power_control:
             return position
-        power = slots["action"].unflatten(-1, (self.num_helpers, -1))[..., 2:]
-        position = position.unflatten(-1, (self.num_helpers, 2))
-        return torch.cat([position, power], dim=-1).flatten(-2)
+        _, power = self.by_helper(slots["action"])
+        return self.joined(position.unflatten(-1, (self.num_helpers, 2)), power)
+
+    def by_helper(self, values: Tensor) -> tuple[Tensor, Tensor]:
+        """The parts of an action or a place (..., actions), whose powers stand behind.
+
+        Returns:
+            two numbers of each helper (..., H, 2), velocity or position, and its power
+            (..., H, 1), or (..., H, 0) where that is nominal.
+        """
+        each = values.unflatten(-1, (self.num_helpers, self.size_of_each_action))
+        moving, power = each.tensor_split([2], dim=-1)
+        return moving, power
+
+    @staticmethod
+    def joined(moving: Tensor, power: Tensor) -> Tensor:
+        """What :meth:`by_helper` takes apart: (..., actions)."""
+        return torch.cat([moving, power], dim=-1).flatten(-2)
 
     def clock(self, observation: Tensor) -> Tensor:
         """The slots flown, from -1 (none) to 1 (all): (..., 1).

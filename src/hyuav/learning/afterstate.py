@@ -38,7 +38,6 @@ class Afterstate(nn.Module):
         self.layout = ObservationLayout(scenario, clock=clock)
         self._clock, self._geofence = clock, geofence
         self.num_helpers, self.num_ues = scenario.num_helpers, scenario.num_ues
-        self._by_helper = scenario.num_helpers, scenario.action_size
         powers = self.num_helpers * scenario.power_control
         self.size = self.layout.size + self.num_helpers * self.num_ues + powers
 
@@ -53,7 +52,7 @@ class Afterstate(nn.Module):
         half_side = scenario.map_side / 2
         position = self.layout.position(observation).unflatten(-1, (self.num_helpers, 2))
         position = position * half_side
-        velocity, power = action.unflatten(-1, self._by_helper).tensor_split([2], dim=-1)
+        velocity, power = self.layout.by_helper(action)
         if self._geofence:
             velocity = fenced(scenario, position, velocity)
         moved = self._physics.move(position, self._physics.velocity(velocity, self._norm_limit))
@@ -67,7 +66,7 @@ class Afterstate(nn.Module):
             place: (..., actions), as :meth:`hyuav.envs.observation.ObservationLayout.place` has it.
             clock: (..., 1), what the clock shows; without one it does not matter.
         """
-        position, power = place.unflatten(-1, self._by_helper).tensor_split([2], dim=-1)
+        position, power = self.layout.by_helper(place)
         position = position * (self._physics.scenario.map_side / 2)
         beside = torch.full_like(position[..., 0], -1.0)
         return self._features(position, beside, power, clock)

@@ -41,7 +41,6 @@ class Demonstrations(nn.Module):
     def __init__(self, learners: int, scenario: Scenario, return_margin: float) -> None:
         super().__init__()
         self._layout = ObservationLayout(scenario, clock=True)
-        self._by_helper = scenario.num_helpers, scenario.action_size
         shape = scenario.num_slots, learners, self._layout.action_size
         self._return_margin = return_margin
         self._slots_per_unit = scenario.num_slots / 2
@@ -97,9 +96,9 @@ class Demonstrations(nn.Module):
         size = self.trajectory.shape[-1]
         slot = flown.clamp(max=len(self.actions) - 1).unsqueeze(-1).expand(*flown.shape, size)
         place = torch.take_along_dim(self.trajectory.transpose(0, 1), slot, dim=1)
-        position, power = place.unflatten(-1, self._by_helper).tensor_split([2], dim=-1)
+        position, power = self._layout.by_helper(place)
         own = self._layout.position(observation).view_as(position)
-        action = torch.cat([(position - own) / self._reach, power], dim=-1).flatten(-2)
+        action = self._layout.joined((position - own) / self._reach, power)
         return action.clamp(-1.0, 1.0).nan_to_num(0.0)
 
     def hover(self, observation: Tensor) -> Tensor:
@@ -108,6 +107,5 @@ class Demonstrations(nn.Module):
         Args:
             observation: (N, K, ...), with a clock.
         """
-        action = self.demonstrate(observation).unflatten(-1, self._by_helper)
-        velocity, power = action.tensor_split([2], dim=-1)
-        return torch.cat([torch.zeros_like(velocity), power], dim=-1).flatten(-2)
+        velocity, power = self._layout.by_helper(self.demonstrate(observation))
+        return self._layout.joined(torch.zeros_like(velocity), power)

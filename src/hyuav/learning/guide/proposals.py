@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from hyuav.envs.observation import ObservationLayout
 from hyuav.envs.transforms import WITHIN
 from hyuav.learning.guide.demonstrations import Demonstrations
 from hyuav.learning.guide.parameters import Guide
@@ -34,7 +35,7 @@ class TrajectoryProposals:
         limit = physics.norm_limit(schemes)
         self._norm_limit = None if limit is None else limit[:, None, :, None]
         self._learners, scenario = len(schemes), physics.scenario
-        self._by_helper = scenario.num_helpers, scenario.action_size
+        self._layout = ObservationLayout(scenario, clock=True)
         self._multiples = evenly(2 * scenario.num_helpers)
         self.normals = (flights, 3 + 2 * scenario.num_helpers)
         """Shape of the standard normal numbers that make the variations of one learner."""
@@ -61,8 +62,8 @@ class TrajectoryProposals:
             action = ((target - position / self._half_side) / self._reach).clamp(-1.0, 1.0)
             velocity = self._physics.velocity(action, self._norm_limit)
             position = self._physics.move(position, velocity).position
-            actions.append(torch.cat([action, own], dim=-1).flatten(-2))
-            trajectory.append(torch.cat([position / self._half_side, own], dim=-1).flatten(-2))
+            actions.append(self._layout.joined(action, own))
+            trajectory.append(self._layout.joined(position / self._half_side, own))
         return torch.stack(actions), torch.stack(trajectory)
 
     def _straight(self, episode: int) -> Tensor:
@@ -88,7 +89,7 @@ class TrajectoryProposals:
         size = self._reach * self._guide.displacement_range**-fineness
         size[:, 0] = 0.0
         displacement = displaced.unsqueeze(-1) * (size.unsqueeze(-1) * normals[..., 3:])
-        places = torch.cat([of_best, of_planned], dim=2).unflatten(-1, self._by_helper)
-        position, power = places.tensor_split([2], dim=-1)
+        places = torch.cat([of_best, of_planned], dim=2)
+        position, power = self._layout.by_helper(places)
         position = (position + displacement.view_as(position)).nan_to_num(0.0)
         return position.clamp(-WITHIN, WITHIN), power.nan_to_num(0.0)

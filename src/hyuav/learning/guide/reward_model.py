@@ -60,7 +60,6 @@ class RewardModel(nn.Module):
         self.variate, self._scale, self._guide = variate, reward_scale, guide
         scenario, most = variate.scenario, guide.most_ue_features
         self._of_each_ue = scenario.num_helpers * scenario.num_ues <= most
-        self._by_helper = scenario.num_helpers, scenario.action_size
         self.size = feature_count(scenario, guide.variate_hidden_sizes[-1], most)
         self.register_buffer("mean", torch.zeros(learners, self.size, 1))
         self.register_buffer("guess", torch.zeros(learners, self.size, 1))
@@ -77,10 +76,10 @@ class RewardModel(nn.Module):
         hidden = self.variate.network.hidden(observed)
         features = [hidden, torch.ones_like(clock)]
         if self._of_each_ue:
-            x, y = place.unflatten(-1, self._by_helper)[..., :2].split(1, dim=-1)
+            x, y = self.variate.layout.by_helper(place)[0].split(1, dim=-1)
             terms = torch.cat([torch.ones_like(x), x, y, x * x, x * y, y * y], dim=-1)
             covered = self.variate.afterstate.coverage(observed) > 0.5
-            covered = covered.unflatten(-1, (self._by_helper[0], -1))
+            covered = covered.unflatten(-1, (self.variate.layout.num_helpers, -1))
             features.append((covered.unsqueeze(-1) * terms.unsqueeze(-2)).flatten(-3))
         return torch.cat(features, dim=-1)
 

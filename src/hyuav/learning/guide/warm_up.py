@@ -7,6 +7,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
+from hyuav.envs.observation import ObservationLayout
 from hyuav.learning.guide.parameters import Guide
 from hyuav.physics.scenario import Scenario
 
@@ -58,7 +59,7 @@ class WarmUp(TensorDictModuleBase):
         super().__init__()
         self._guide, self._half_side = guide, scenario.map_side / 2
         self._reach = scenario.max_speed * scenario.slot_duration
-        self._by_helper = scenario.num_helpers, scenario.action_size
+        self._layout = ObservationLayout(scenario, clock=True)
         coordinates = 2 * scenario.num_helpers
         self.register_buffer("origin", torch.zeros(learners, coordinates))
         self.register_buffer("episode", torch.zeros(learners, 1))
@@ -67,8 +68,7 @@ class WarmUp(TensorDictModuleBase):
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Read ``action``, ``step_count`` (N, 1) and ``position`` (N, H, 2) m; act."""
         action, begins = tensordict["action"], tensordict["step_count"] == 0
-        drawn = torch.randn_like(action).unflatten(-1, self._by_helper)
-        normal, for_power = drawn.tensor_split([2], dim=-1)
+        normal, for_power = self._layout.by_helper(torch.randn_like(action))
         anywhere = torch.special.ndtr(normal).flatten(-2)
         self.origin.copy_(torch.where(begins & (self.episode == 0), anywhere, self.origin))
         self.episode.add_(begins)
@@ -77,7 +77,7 @@ class WarmUp(TensorDictModuleBase):
         towards = (destination.view_as(normal) - tensordict["position"]) / self._reach
         velocity = (towards + self._guide.warm_up_noise * normal).clamp(-1.0, 1.0)
         power = 2.0 * torch.special.ndtr(for_power) - 1.0
-        flown = torch.cat([velocity, power], dim=-1).flatten(-2)
+        flown = self._layout.joined(velocity, power)
         over = self.episode > self._guide.warm_up_episodes
         tensordict["action"] = torch.where(over, action, flown)
         return tensordict
