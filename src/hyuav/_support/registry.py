@@ -48,7 +48,9 @@ class Registry(dict[str, Member]):
         Raises:
             InputError: there is none of that name, or it cannot be loaded.
         """
-        if isinstance(name, str) and name not in self:
+        if isinstance(name, str):
+            if name in self:
+                return self[name]
             for entry in entry_points(group=self.group, name=name):
                 self[name] = self._load(name, entry.load)
             if is_reference(name):
