@@ -66,6 +66,12 @@ def upper_bounds(summary: Mapping[str, Any]) -> str:
     return f"no flight exceeds {', '.join(told)} bps/Hz"
 
 
+def earned(result: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What a scheme earned by the reward of its evaluation, with the interval."""
+    rate: Mapping[str, Any] = result.get("reward", result["secrecy_sum_rate"])
+    return rate
+
+
 def flight_cells(result: Mapping[str, Any], *, bounded: bool) -> tuple[str, ...]:
     """How a scheme flew, as text.
 
@@ -79,7 +85,7 @@ def flight_cells(result: Mapping[str, Any], *, bounded: bool) -> tuple[str, ...]
         another reward was earned, the secrecy sum-rate, the shares of relay slots and of UEs
         offloading, and the slots off the map. A fraction of what a scheme does not have is "-".
     """
-    rate = result.get("reward", result["secrecy_sum_rate"])
+    rate = earned(result)
     mean, (low, high) = rate["mean"], rate["ci95"]
     digits = 1 if abs(mean) >= 100.0 else 2
     share = result.get("fraction_of_upper_bound" if bounded else "fraction_of_hybrid_optimum")

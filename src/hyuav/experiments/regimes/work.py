@@ -14,6 +14,7 @@ from hyuav._support.errors import InputError, ScenarioWarning
 from hyuav._support.files import read_parquet, write_durably
 from hyuav._support.terminal import make_progress
 from hyuav.envs.rewards import DEFAULT
+from hyuav.experiments import schemes
 from hyuav.experiments.comparison.processes import Workers
 from hyuav.experiments.configuration import Config
 from hyuav.experiments.regimes.plan import Axes, MapPoint, Regimes
@@ -50,8 +51,7 @@ def solve_point(scenario: Scenario, options: Regimes) -> dict[str, float]:
         seed=options.seed,
         reward=DEFAULT,
     )
-    # One that jams without power is no helper, wherever it is.
-    silent = dataclasses.replace(fixed, jamming_power=0.0)
+    silent = schemes.SCHEMES[schemes.NO_HELPER].flown_in(fixed)  # wherever the helper is
     with warnings.catch_warnings():  # that nothing is earned somewhere is what the map shows
         warnings.simplefilter("ignore", ScenarioWarning)
         alone = solve(silent, ["jamming"], resolution=scenario.map_side)["jamming"]

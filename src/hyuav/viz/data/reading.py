@@ -20,6 +20,7 @@ from hyuav.experiments.evaluation import (
     WAY,
     helper_columns,
 )
+from hyuav.experiments.evaluation_table import earned
 from hyuav.experiments.schemes import LABELS, NO_HELPER, OPTIMA
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import num_helpers
@@ -95,12 +96,6 @@ def _is_account(account: dict[str, Any]) -> bool:
         isinstance(value, int | float) and abs(value) <= sys.float_info.max
         for value in needed + optional
     )
-
-
-def earned(account: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What a scheme earned by the reward of its evaluation, with the interval."""
-    rate: Mapping[str, Any] = account.get("reward", account["secrecy_sum_rate"])
-    return rate
 
 
 def unit_of(config: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from hyuav._support.errors import InputError
 from hyuav.experiments.comparison.tables import label
 from hyuav.experiments.elsewhere import HORIZONS
 from hyuav.experiments.evaluation import EVALUATION_FILE, FLIGHTS_FILE, Evaluation
-from hyuav.experiments.evaluation_table import earned_title
+from hyuav.experiments.evaluation_table import earned, earned_title
 from hyuav.experiments.metrics import readable_metrics
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.scenarios import named_scenario
@@ -20,7 +20,6 @@ from hyuav.experiments.schemes import LEARNED, LEARNED_AS_IN_PAPER, NO_HELPER
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.curves import learning_curves, learning_table
 from hyuav.viz.data.reading import (
-    earned,
     is_drawable,
     read_evaluation,
     read_flights,
