@@ -90,20 +90,8 @@ def test_every_seed_of_the_robust_variant_learns_the_power() -> None:
 def test_every_seed_of_the_robust_variant_leads_two_helpers_to_two_eavesdroppers() -> None:
     """Without a helper nothing is secret, and a single one earns a tenth of what two earn."""
     torch.set_num_threads(1)
-    scenario = dataclasses.replace(
-        Scenario.preset("two_clusters"),
-        ue_positions=(
-            *((-80, -40), (-70, -55), (-60, -70), (-85, -60), (-65, -45)),
-            *((70, 60), (60, 75), (80, 50), (75, 70), (55, 60)),
-        ),
-        eavesdropper_positions=((-60, -50), (60, 55)),
-        eavesdropper_altitude=100.0,
-        helper_starts=((0, 0), (0, 0)),
-        coverage_radius=120.0,
-        jamming_power=1e-4,
-        num_slots=10,
-        fading=False,
-    )
+    contested = Scenario.preset("contested")
+    scenario = dataclasses.replace(contested, num_slots=10, fading=False)
     parameters = TrainingParameters(num_episodes=200, evaluation_every=5, evaluation_episodes=1)
     training = Training(scenario, range(3), ALGORITHMS["ddpg_robust"](), parameters)
     list(training.episodes())
