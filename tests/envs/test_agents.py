@@ -124,7 +124,9 @@ def test_networks_collector_and_loss_of_torchrl_take_the_group(share_params: boo
         **{name: ("helpers", name) for name in ("reward", "done", "terminated")},
     )
     loss.make_value_estimator(gamma=0.95)
-    collector = Collector(env, actor, frames_per_batch=16, total_frames=16)
+    collector = Collector(
+        env, actor, frames_per_batch=16, total_frames=16, auto_register_policy_transforms=False
+    )
     (batch,) = list(collector)
     losses = loss(batch.reshape(-1))
     (losses["loss_actor"] + losses["loss_value"]).backward()
