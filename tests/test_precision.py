@@ -16,7 +16,6 @@ import torch
 
 from hyuav import (
     EvaluationParameters,
-    FlightPolicy,
     Learner,
     Scenario,
     Training,
@@ -108,7 +107,7 @@ def references() -> Any:
     scenario = Scenario.preset("two_clusters")
     optima = solve_optimum(scenario, resolution=10.0, draws=8, evaluation_draws=20)
     straight = {"re_lt": [re_lt(scenario)], "ja_lt": [ja_lt(scenario)]}
-    best = {"optimum": [FlightPolicy(optima["hybrid"].path, scenario)]}
+    best = {"optimum": [optima["hybrid"].policy]}
     flown = evaluate(scenario, "", best | straight, EvaluationParameters(episodes=4))
     return optima, flown, random_layout(0), random_layout(1)
 

@@ -51,7 +51,7 @@ import dataclasses
 import hyuav
 
 scenario = dataclasses.replace(hyuav.Scenario.preset("two_clusters"), num_slots=5)
-best = hyuav.FlightPolicy(hyuav.solve_optimum(scenario, resolution=10.0)["hybrid"].path, scenario)
+best = hyuav.solve_optimum(scenario, resolution=10.0)["hybrid"].policy
 few = hyuav.EvaluationParameters(episodes=3, flights=2)
 hyuav.evaluate(scenario, "own", {"optimum": [best]}, few)
 """

@@ -44,9 +44,7 @@ def policies() -> Policies:
         "ja_lt": [ja_lt(SCENARIO)],
         "no_helper": [no_helper(SCENARIO)],
         "proposed": [learned_policy(SCENARIO, algorithm, weights, range(2))],
-        **{
-            OPTIMA[rule]: [FlightPolicy(optimum.path, SCENARIO)] for rule, optimum in optima.items()
-        },
+        **{OPTIMA[rule]: [optimum.policy] for rule, optimum in optima.items()},
     }
 
 

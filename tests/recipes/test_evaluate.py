@@ -61,7 +61,8 @@ def test_several_helpers_are_trained_evaluated_and_drawn(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(bounds, "MOST_RATES", 10**5)  # which makes them coarse
+    monkeypatch.setattr(bounds, "FIRST_CELLS", 6**4)  # which makes them coarse
+    monkeypatch.setattr(bounds, "ROUNDS", 0)
     crowded = Scenario.preset("two_eavesdroppers")
     crowded = dataclasses.replace(crowded, eavesdroppers="colluding", speed_limit="disc")
     crowded.save(tmp_path / "crowded.yaml")

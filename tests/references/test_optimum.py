@@ -38,7 +38,7 @@ def few_flights(**changes: Any) -> Scenario:
 
 def flown_return(optimum: Optimum, episodes: int) -> torch.Tensor:
     env = make_env(optimum.scenario, optimum.mode_rule, batch_size=episodes, seed=5)
-    policy = FlightPolicy(optimum.path, optimum.scenario)
+    policy = optimum.policy
     flight = env.rollout(optimum.scenario.num_slots, policy)
     return flight["next", "reward"].sum(dim=(-1, -2))
 
@@ -261,7 +261,7 @@ def test_the_seed_makes_it_reproducible() -> None:
 def test_the_policy_flies_any_batch_along_the_path(batch: tuple[int, ...]) -> None:
     optimum = solve_optimum(without_fading(), ["relay"], resolution=4.0)["relay"]
     env = make_env(optimum.scenario, "relay", batch_size=batch)
-    flight = env.rollout(20, FlightPolicy(optimum.path, optimum.scenario))
+    flight = env.rollout(20, optimum.policy)
     assert flight["action"].shape == (*batch, 20, 2)
     flown = flight["next", "position"].double()
     assert (flown - optimum.path[1:]).abs().max() < 2e-5

@@ -84,7 +84,7 @@ def test_with_fading_the_value_is_what_the_flight_earns() -> None:
     scenario = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=8)
     best = solve_optimum(scenario, ["jamming"], resolution=10.0, reward=EFFICIENCY)["jamming"]
     env = make_env(scenario, "jamming", 2000, seed=1, reward=EFFICIENCY)
-    returns = env.rollout(8, FlightPolicy(best.path, scenario))["next", "episode_reward"][:, -1]
+    returns = env.rollout(8, best.policy)["next", "episode_reward"][:, -1]
     error = float(returns.std()) / 2000**0.5 + best.standard_error
     assert abs(float(returns.mean()) - best.value) < 4 * error
 

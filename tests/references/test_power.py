@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 import torch
 
-from hyuav import FlightPolicy, Scenario, make_env
+from hyuav import Scenario, make_env
 from hyuav.references.optimum import solve_horizons
 
 VALUES = {
@@ -34,7 +34,7 @@ def test_the_best_flights_whose_power_is_chosen_in_each_slot(name: str) -> None:
     nominal = torch.where(best.modes == 1, scenario.relay_power, scenario.jamming_power)
     torch.testing.assert_close(best.power, nominal * best.share)
     env = make_env(scenario, "hybrid", batch_size=())
-    flown = env.rollout(20, FlightPolicy(best.path, scenario, best.share))["next"]
+    flown = env.rollout(20, best.policy)["next"]
     assert float(flown["episode_reward"][-1]) == pytest.approx(best.value, rel=1e-4)
 
 
@@ -44,7 +44,7 @@ def test_with_fading_the_chosen_power_earns_what_is_told() -> None:
     )
     best = solve_horizons(scenario, [10], ["hybrid"], resolution=5.0, draws=32)["hybrid"][10]
     env = make_env(scenario, batch_size=(2000,), seed=1)
-    flown = env.rollout(10, FlightPolicy(best.path, scenario, best.share))["next"]
+    flown = env.rollout(10, best.policy)["next"]
     returns = flown["episode_reward"][:, -1]
     error = float(returns.std()) / 2000**0.5 + best.standard_error
     assert abs(float(returns.mean()) - best.value) < 5 * error

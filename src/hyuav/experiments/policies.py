@@ -20,7 +20,6 @@ from hyuav.experiments.schemes import (
 )
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
-from hyuav.references.flight import FlightPolicy
 from hyuav.references.objectives import why_no_optimum
 from hyuav.references.optimum import RESOLUTION, solve_optimum
 from hyuav.references.straight import ja_lt, no_helper, re_lt
@@ -128,13 +127,11 @@ def references(
     with make_progress(console, "optima") as progress:
         optima = solve_optimum(scenario, resolution=resolution, track=progress.track, reward=reward)
     for rule, optimum in optima.items():
-        flight = FlightPolicy(optimum.path, scenario, optimum.share, optimum.upper_bound)
-        policies[OPTIMA[rule]] = [flight]
+        policies[OPTIMA[rule]] = [optimum.policy]
     if scenario.num_helpers == 1 and not scenario.power_control and reward == DEFAULT:
         controlled = SCHEMES[OPTIMUM_POWER].flown_in(scenario)
         spacing = max(resolution or RESOLUTION, POWER_RESOLUTION)
         with make_progress(console, "optimum, power") as progress:
             found = solve_optimum(controlled, ["hybrid"], resolution=spacing, track=progress.track)
-        best = found["hybrid"]
-        policies[OPTIMUM_POWER] = [FlightPolicy(best.path, controlled, best.share)]
+        policies[OPTIMUM_POWER] = [found["hybrid"].policy]
     return policies

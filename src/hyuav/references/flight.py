@@ -34,9 +34,11 @@ class FlightPolicy(TensorDictModuleBase):
         InputTypeError: an argument of the wrong type.
 
     Example:
+        >>> there_and_back = [[-60, -60]], [[-45, -60]], [[-60, -60]]
+        >>> policy = FlightPolicy(there_and_back, "two_clusters")
         >>> optimum = solve_optimum("two_clusters", ["hybrid"])["hybrid"]
         >>> env = make_env(optimum.scenario, "hybrid", batch_size=(100,))
-        >>> env.rollout(20, FlightPolicy(optimum.path, optimum.scenario))
+        >>> flights = env.rollout(20, optimum.policy)
     """
 
     in_keys = ("position", "step_count")

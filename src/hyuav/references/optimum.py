@@ -31,7 +31,7 @@ from hyuav.physics.modes import MODE_RULES, fixed_modes
 from hyuav.physics.scenario import Scenario, ScenarioLike, as_scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.bounds import CellBounds
-from hyuav.references.flight import flyable
+from hyuav.references.flight import FlightPolicy, flyable
 from hyuav.references.grid import (
     Values,
     best_flight,
@@ -94,6 +94,11 @@ class Optimum:
     """(T, H): the same in units of the nominal power."""
     upper_bound: float | None = None
     """Of what any flight earns; None where none is computed."""
+
+    @property
+    def policy(self) -> FlightPolicy:
+        """What flies it in environments of this scenario."""
+        return FlightPolicy(self.path, self.scenario, self.share, self.upper_bound)
 
 
 def solve_optimum(
@@ -247,7 +252,7 @@ def solve_horizons(
                 modes,
                 _nominal(scenario, modes) * share,
                 share,
-                None if bounds is None else bounds.of(mode_rule, horizon),
+                None if bounds is None else bounds.of(mode_rule, horizon, value),
             )
     return optima
 

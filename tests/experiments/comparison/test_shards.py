@@ -73,7 +73,8 @@ def test_the_optima_are_kept_as_they_were_found(optima: Optima) -> None:
 def test_the_optima_of_several_helpers_are_kept_with_their_upper_bounds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bounds, "MOST_RATES", 10**5)  # which makes them coarse
+    monkeypatch.setattr(bounds, "FIRST_CELLS", 6**4)  # which makes them coarse
+    monkeypatch.setattr(bounds, "ROUNDS", 0)
     two = dataclasses.replace(Scenario.preset("two_eavesdroppers"), num_slots=2, fading=False)
     optima = Optima(two, (2,), 20.0, tmp_path / "two.parquet")
     optima.solve()

@@ -19,7 +19,6 @@ from hyuav.experiments.schemes import LABELS, LEARNED, NO_HELPER, OPTIMA
 from hyuav.learning.learners import Learner
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
-from hyuav.references.flight import FlightPolicy
 from hyuav.references.optimum import RESOLUTION, Optimum, solve_optimum
 from hyuav.references.straight import no_helper
 from hyuav.viz.data.index import RunIndex, Stamp
@@ -136,7 +135,7 @@ def flown(
     """
     best = optimum(scenario, rule, fine=fine)
     policies: Policies = {
-        OPTIMA[rule]: [FlightPolicy(best.path, scenario, best.share, best.upper_bound)],
+        OPTIMA[rule]: [best.policy],
         NO_HELPER: [no_helper(scenario)],
     }
     if checkpoint is not None:
