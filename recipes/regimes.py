@@ -33,6 +33,7 @@ from hyuav.experiments.regimes.plan import Axes, Axis, Regimes
 from hyuav.experiments.regimes.work import RegimeDirectory
 from hyuav.experiments.scenarios import named_scenario
 from hyuav.viz.data.regimes import LABELS, RegimeMap, read_regimes, shares_table, times
+from hyuav.viz.html.page import write_report
 from hyuav.viz.paper.regimes import regimes_figure
 from hyuav.viz.paper.style import save_figure
 
@@ -54,7 +55,7 @@ def main(config: Config, directory: Path) -> None:
 
 
 def regimes(config: Config, directory: Path) -> None:
-    """Solve what is missing, print the shares of the map, draw it."""
+    """Solve what is missing, print the shares of the map, draw it and write its report."""
     options, axes = section(config, Regimes), section(config, Axes)
     require_range(config)
     torch.set_num_threads(1)
@@ -66,6 +67,7 @@ def regimes(config: Config, directory: Path) -> None:
         shown = read_regimes(directory)
         print_shares(shown, console)
         save_figure(regimes_figure(shown), directory, "regimes")
+        print_line(f"its report: {write_report(directory).name}", console)
     print_line(f"map: {directory}", console)
     for name, reason in failures.items():
         print(harmless(f"failed: {name}: {reason}"), file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Write the report of a run or of a comparison: one HTML file.
+"""Write the report of a run, a comparison or a map of regimes: one HTML file.
 
 hyuav report run=runs/NAME
 hyuav report run=[runs/ONE,runs/OTHER]
@@ -27,7 +27,7 @@ class Report(Parameters):
     """What to report on."""
 
     run: OneOrMore[Text] | None = parameter(None)
-    """Directories of runs or comparisons, finished or not."""
+    """Directories of runs, comparisons or maps of regimes, finished or not."""
     algorithm: ZeroOrMore[OwnAlgorithm] = parameter(())
     """The runs' own algorithms; a run's directory names a file, but only you let it be run."""
     reward: ZeroOrMore[OwnReward] = parameter(())

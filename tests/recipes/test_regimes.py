@@ -39,11 +39,13 @@ def test_a_map_is_solved_printed_kept_and_drawn(
     solved = solve_point(scenario, Regimes(resolution=20.0, power_step=20.0))
     assert row[list(SCHEMES)].to_dict() == pytest.approx(solved)
     assert {path.name for path in here.iterdir()} == {
-        *("config.yaml", "lines"),
+        *("config.yaml", "lines", "report.html"),
         *(f"regimes.{kind}" for kind in ("csv", "png", "pdf")),
     }
     assert "two_clusters, 6 points" in printed
-    assert printed.endswith(f"map: {here}\n")
+    assert printed.endswith(f"its report: report.html\nmap: {here}\n")
+    report = (here / "report.html").read_text(encoding="utf-8")
+    assert "What power control adds" in report
 
 
 def test_only_what_is_missing_is_solved_again_and_another_map_is_refused(

@@ -25,7 +25,7 @@ from hyuav.references.optimum import solve_optimum
 SCHEMES = ("no_helper", "relay", "jamming", "hybrid", "power_control")
 """What is solved at each point. The last is the hybrid helper whose power is chosen too."""
 
-REGIMES_FILE = "regimes.csv"
+REGIMES_FILE, LINES = "regimes.csv", "lines"
 
 WORKING = ("workers", "retries", "output")
 """Entries of the configuration that change how the work is done and not what comes of it."""
@@ -124,7 +124,7 @@ class RegimeDirectory:
         keep_request(path, config, WORKING, "a map")
         self.path, self.options = path, options
         self.lines = [
-            MapLine(axes, points, options, path / "lines" / f"{number:04}.parquet")
+            MapLine(axes, points, options, path / LINES / f"{number:04}.parquet")
             for number, points in enumerate(lines)
         ]
 

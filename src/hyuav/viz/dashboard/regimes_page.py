@@ -7,7 +7,7 @@ from hyuav._support.formatting import percent
 from hyuav.experiments.regimes.work import REGIMES_FILE
 from hyuav.viz.dashboard.plain import ensure_offered, plain, refusals
 from hyuav.viz.data.index import RunIndex
-from hyuav.viz.data.regimes import LABELS, STEPS, RegimeMap, read_regimes, shares_table, times
+from hyuav.viz.data.regimes import LABELS, SHADES, RegimeMap, read_regimes, shares_table, times
 from hyuav.viz.html.regimes import BEST, VIEWS, regimes_map
 
 KEPT = ("regimes_map", "regimes_view")
@@ -46,10 +46,7 @@ def _draw(found: RegimeMap, view: str) -> None:
         regimes_map(found, view), theme=None, key="regimes", config={"displaylogo": False}
     )
     if view == BEST:
-        steps = ", ".join(f"{step:g}" for step in STEPS)
-        st.caption(
-            f"The fuller a color, the more it brings: below and above {steps} times the others."
-        )
+        st.caption(SHADES)
     shares = shares_table(found)
     st.dataframe(
         {

@@ -14,7 +14,7 @@ from hyuav._support.files import read_regular
 from hyuav._support.formatting import in_words
 from hyuav._support.yaml_files import read_yaml
 from hyuav.experiments.regimes.plan import Axes, Axis
-from hyuav.experiments.regimes.work import REGIMES_FILE, SCHEMES
+from hyuav.experiments.regimes.work import LINES, REGIMES_FILE, SCHEMES
 from hyuav.experiments.scenarios import named_scenario
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.schemes import COLORS, scheme_color
@@ -33,6 +33,12 @@ NEAR = 0.01
 
 STEPS = (1.1, 1.5, 3.0)
 """Between the shades: how many times as much as the best of the others the best scheme brings."""
+
+SHADES = (
+    "The fuller a color, the more it brings: below and above "
+    f"{', '.join(f'{step:g}' for step in STEPS)} times the others."
+)
+"""What the shades tell."""
 
 GAIN_LEVELS = (1.05, 1.1, 1.2, 1.4, 1.7, 2.2, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """Between the colors of the gain: many times as much as the best at fixed power."""
@@ -84,6 +90,11 @@ class RegimeMap(NamedTuple):
     def shades(self) -> NDArray[np.int64]:
         """Where ``factor`` stands between :data:`STEPS`, from 0 on, as :meth:`grid` has it."""
         return np.digitize(np.nan_to_num(self.grid("factor"), posinf=np.inf), STEPS)
+
+
+def is_map(directory: Path) -> bool:
+    """Whether a directory holds a map of regimes, however much of it is there yet."""
+    return (directory / LINES).is_dir() or (directory / REGIMES_FILE).is_file()
 
 
 def read_regimes(directory: Path) -> RegimeMap:

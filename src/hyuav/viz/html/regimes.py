@@ -1,30 +1,84 @@
-"""The map of regimes as a Plotly figure, which tells each point's values."""
+"""The map of regimes: a Plotly figure, which tells each point's values, and its report."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
+from markupsafe import Markup
 
+from hyuav._support.errors import InputError
+from hyuav._support.formatting import percent
 from hyuav.experiments.regimes.plan import Axis
-from hyuav.experiments.regimes.work import SCHEMES
+from hyuav.experiments.regimes.work import REGIMES_FILE, SCHEMES
+from hyuav.viz.data.reading import readable_config
 from hyuav.viz.data.regimes import (
     GAIN_LEVELS,
     LABELS,
+    NEAR,
     NOTHING,
     REGIME_COLORS,
     REGIMES,
+    SHADES,
     STEPS,
     RegimeMap,
     axis_label,
     edges,
+    read_regimes,
     shade,
+    shares_table,
+    times,
 )
+from hyuav.viz.html.document import Page, Picture, Section
+from hyuav.viz.html.run import config_section
 from hyuav.viz.html.style import axis, base_layout, legend_below, plain
+from hyuav.viz.html.tables import html_table
 
 BEST, GAIN = "best", "gain"
 
 VIEWS = {BEST: "Best scheme at fixed power", GAIN: "What power control adds"}
 """What the figure may show."""
+
+
+def regimes_page(directory: Path) -> Page:
+    """What the directory of a map tells, however much of it is there yet."""
+    facts: dict[str, str] = {}
+    try:
+        found = read_regimes(directory)
+    except InputError as error:
+        begun = (directory / REGIMES_FILE).exists()
+        shown = Section("Regimes", [str(error) if begun else "The map is not finished yet."])
+    else:
+        pictures = [
+            Picture(title, {"": regimes_map(found, view)}, small=True)
+            for view, title in VIEWS.items()
+        ]
+        notes = [
+            "The best flights under each scheme, solved at each point. Hybrid holds relaying and "
+            "jamming, so that it is never worse: the simplest scheme that comes within "
+            f"{percent(NEAR, 0)} of the best is named. {SHADES}",
+            f"The star marks {found.own_label}.",
+        ]
+        shown = Section("Regimes", notes, pictures, [shares_html(found)])
+        facts["Scenario"] = found.name
+        facts["Points"] = f"{found.axes.x.points} x {found.axes.y.points}"
+    sections = [shown, config_section(readable_config(directory))]
+    return Page("Map of regimes", directory.resolve().name, facts, sections)
+
+
+def shares_html(found: RegimeMap) -> Markup:
+    """On how much of the map each scheme is best, and by how much at most."""
+    swatch = Markup('<span class="swatch" style="background:{}"></span>{}')
+    rows = [
+        (
+            swatch.format(REGIME_COLORS[row["best"]], LABELS[row["best"]]),
+            percent(row["share"]),
+            times(row["factor"]),
+        )
+        for _, row in shares_table(found).iterrows()
+    ]
+    headings = "Best at fixed power", "Share of the map", "Times the others, at most"
+    return html_table("Shares of the map", headings, rows)
 
 
 def regimes_map(found: RegimeMap, view: str = BEST) -> go.Figure:
