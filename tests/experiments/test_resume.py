@@ -27,9 +27,7 @@ from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from killed_training import OFF, differences, outcome, small
 
 SILENT = Console(file=io.StringIO())
-
-EPISODES = 5
-"""Of an unbroken training; the warm-up takes three."""
+EPISODES = 5  # of an unbroken training; the warm-up takes three
 
 
 def every_episode(num_episodes: int) -> RunConfiguration:

@@ -206,9 +206,7 @@ def test_a_restored_compiled_training_continues_bit_for_bit() -> None:
 @pytest.mark.slow
 def test_mixed_horizons_and_schemes_compiled_on_threads_agree_with_eager_ones() -> None:
     mixed = [Learner("hybrid", 1, 3), Learner("relay", 1), Learner("jamming", 2, 3), Learner()]
-    eager, graph = (
-        trained(mixed, compile=choice, cohorts=2) for choice in ("never", "always")
-    )
+    eager, graph = (trained(mixed, compile=choice, cohorts=2) for choice in ("never", "always"))
     for one, two in zip(eager.episodes(), graph.episodes(), strict=True):
         torch.testing.assert_close(
             one.accumulated_reward, two.accumulated_reward, rtol=1e-3, atol=1e-3
