@@ -45,7 +45,7 @@ dashboard: $(VENV)/.dashboard ## follow trainings, compare runs, play flights, t
 	$(BIN)/python recipes/dashboard.py $(ARGS)
 
 test: setup ## run the tests
-	$(BIN)/python -m pytest --numprocesses 2 $(ARGS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal $(ARGS)
 
 test-slow: setup ## run the checks that take minutes: learning, pages, distributions
 	$(BIN)/python -m pytest -m slow $(ARGS)

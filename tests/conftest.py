@@ -1,7 +1,10 @@
 """Shared by all tests: one thread, reproducible property tests, environments and recipes."""
 
+import contextlib
 import dataclasses
 import importlib.util
+import io
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -98,6 +101,43 @@ def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Call]:
     yield run
     torch.set_num_threads(1)
     forget_own()
+
+
+@pytest.fixture(scope="session")
+def called_before() -> dict[tuple[tuple[str, ...], ...], tuple[Path, str]]:
+    """What recipes left behind and printed, by their names and arguments in the order of calls."""
+    return {}
+
+
+@pytest.fixture
+def once(
+    call: Call,
+    called_before: dict[tuple[tuple[str, ...], ...], tuple[Path, str]],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Call:
+    """As ``call``, but what came of the same calls in another test is copied.
+
+    For what a test begins with, in a directory in which nothing else is done before.
+    """
+    calls: tuple[tuple[str, ...], ...] = ()
+
+    def run(*words: str) -> None:
+        nonlocal calls
+        calls = (*calls, words)
+        if calls not in called_before:
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                call(*words)
+            kept = tmp_path_factory.mktemp("kept") / "directory"
+            shutil.copytree(tmp_path, kept)
+            called_before[calls] = kept, printed.getvalue()
+        kept, told = called_before[calls]
+        shutil.copytree(kept, tmp_path, dirs_exist_ok=True)
+        monkeypatch.chdir(tmp_path)
+        print(told, end="")
+
+    return run
 
 
 @pytest.fixture

@@ -24,6 +24,12 @@ TINY_TRAINING = (
 TINY = (*TINY_TRAINING, "algorithm.hidden_sizes=[8]", "logger.mode=disabled")
 """Of one algorithm, logged nowhere."""
 
+SHORT = (*TINY, "training.compile=never", "scenario.num_slots=10")
+"""The training with which most tests begin."""
+
+FEW = ("evaluation.episodes=4", "evaluation.resolution=10")
+"""An evaluation as small as that."""
+
 TINY_COMPARISON = (
     *TINY_TRAINING,
     *("training.compile=never", "evaluation.episodes=4", "evaluation.resolution=10"),

@@ -4,11 +4,11 @@ import dataclasses
 import errno
 import io
 import math
+import multiprocessing
 import os
 import re
 import shutil
-import subprocess
-import sys
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
 from killed_training import OFF, differences, outcome, small
 
 SILENT = Console(file=io.StringIO())
+EPISODES = 5  # of an unbroken training; the warm-up takes three
 
 
 def every_episode(num_episodes: int) -> RunConfiguration:
@@ -37,16 +38,18 @@ def every_episode(num_episodes: int) -> RunConfiguration:
 
 
 def interrupt(directory: Path) -> RunDirectory:
-    """A training of 6 episodes, of which 3 are flown."""
+    """A training of all episodes, of which 3 are flown."""
     run = train(directory, every_episode(3), OFF, SILENT)
     config = run.config_file.read_text()
-    run.config_file.write_text(config.replace("num_episodes: 3", "num_episodes: 6"))
+    run.config_file.write_text(config.replace("num_episodes: 3", f"num_episodes: {EPISODES}"))
     return run
 
 
 @pytest.fixture(scope="module")
 def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return train(tmp_path_factory.mktemp("whole") / "run", every_episode(6), OFF, SILENT).path
+    return train(
+        tmp_path_factory.mktemp("whole") / "run", every_episode(EPISODES), OFF, SILENT
+    ).path
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +85,7 @@ def test_going_on_ends_with_the_numbers_of_an_unbroken_training(
 def test_a_training_that_only_began_goes_on_from_its_initial_weights(
     tmp_path: Path, unbroken: Path
 ) -> None:
-    configuration = every_episode(6)
+    configuration = every_episode(EPISODES)
     start = configuration.new_training()
     run = RunDirectory.create(tmp_path / "run", configuration, None, first_checkpoint(start))
     resume(run.path, OFF, SILENT)
@@ -284,7 +287,7 @@ def test_a_full_disk_halts_a_training_which_goes_on_when_there_is_room(
 ) -> None:
     with small_disk(tmp_path / "disk") as disk:
         run = interrupt(disk.path / "run")
-        line = r"^halted after episode 4 of 6: [^\n]*: (No space|File too large)[^\n]*is kept$"
+        line = r"^halted after episode 4 of 5: [^\n]*: (No space|File too large)[^\n]*is kept$"
         with disk.full(), pytest.raises(Halted, match=line) as halted:
             resume(run.path, OFF, SILENT)
         assert halted.value.resumable
@@ -298,7 +301,7 @@ def test_a_read_only_directory_is_refused_before_anything_is_done(tmp_path: Path
         with disk.read_only():
             for path in (run.path, disk.path / "another"):
                 with pytest.raises(InputError, match=r"run directory = .*: expected a writable"):
-                    train_or_resume(path, every_episode(6), OFF, SILENT)
+                    train_or_resume(path, every_episode(EPISODES), OFF, SILENT)
         assert RunDirectory(run.path).metrics()["episode"].max() == 3
 
 
@@ -311,14 +314,16 @@ def test_two_processes_do_not_train_in_one_directory(run: RunDirectory) -> None:
     assert not (run.path / LOCK_FILE).exists()
 
 
+def die_reserving(run: RunDirectory) -> None:
+    with run.reserved():
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
 def test_a_killed_process_reserves_nothing(run: RunDirectory) -> None:
-    reserving = (
-        "import os, sys\n"
-        "from hyuav.experiments.run_directory import RunDirectory\n"
-        "with RunDirectory(sys.argv[1]).reserved():\n"
-        "    os.kill(os.getpid(), 9)\n"
-    )
-    subprocess.run([sys.executable, "-c", reserving, str(run.path)], check=False)
+    other = multiprocessing.get_context("fork").Process(target=die_reserving, args=(run,))
+    other.start()
+    other.join()
+    assert other.exitcode == -signal.SIGKILL
     assert (run.path / LOCK_FILE).exists()
     with run.reserved():
         pass
@@ -337,17 +342,17 @@ def test_where_nothing_can_be_locked_nobody_is_kept_away(
 
 
 def test_the_same_request_goes_on_and_another_is_refused(run: RunDirectory, unbroken: Path) -> None:
-    train_or_resume(run.path, every_episode(6), OFF, SILENT)
+    train_or_resume(run.path, every_episode(EPISODES), OFF, SILENT)
     assert differences(outcome(run.path), outcome(unbroken)) == []
     with pytest.raises(InputError, match="expected one without a run in it"):
-        train_or_resume(run.path, every_episode(7), OFF, SILENT)
+        train_or_resume(run.path, every_episode(EPISODES + 1), OFF, SILENT)
 
 
 def test_a_learner_without_finite_numbers_stops_and_the_others_do_not_notice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Its critic begins with weights so large that the square of its loss is beyond a float."""
-    configuration = every_episode(6)
+    configuration = every_episode(EPISODES)
     weights = configuration.new_training().best_weights
     healthy = train(tmp_path / "whole", configuration, OFF, SILENT, initial_weights=weights)
     for name, values in weights.items():
@@ -360,7 +365,7 @@ def test_a_learner_without_finite_numbers_stops_and_the_others_do_not_notice(
     assert line.startswith(told)
     metrics, whole = run.metrics(), healthy.metrics()
     last = metrics.groupby("learner")["episode"].max().to_dict()
-    assert last[0] == last[2] == 6
+    assert last[0] == last[2] == EPISODES
     assert 8 * last[1] < first <= 8 * last[1] + 8
     for learner in (0, 2):
         own, other = (rows[rows["learner"] == learner] for rows in (metrics, whole))
@@ -369,7 +374,7 @@ def test_a_learner_without_finite_numbers_stops_and_the_others_do_not_notice(
 
 
 def test_a_training_halts_when_no_learner_is_left(tmp_path: Path) -> None:
-    configuration = every_episode(6)
+    configuration = every_episode(EPISODES)
     wild = dataclasses.replace(
         configuration.algorithm,
         actor_learning_rate=1.0,
@@ -377,7 +382,7 @@ def test_a_training_halts_when_no_learner_is_left(tmp_path: Path) -> None:
         reward_scale=1e30,
     )
     configuration = dataclasses.replace(configuration, algorithm=wild)
-    with pytest.raises(Halted, match=r"^halted after episode \d of 6: every learner has stopped$"):
+    with pytest.raises(Halted, match=r"^halted after episode \d of \d: every learner has stopped$"):
         train(tmp_path / "run", configuration, OFF, SILENT)
     run = RunDirectory(tmp_path / "run")
     assert all(values.isfinite().all() for values in run.best_weights().values())

@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ SCENARIO = dataclasses.replace(Scenario.preset("two_clusters"), num_slots=5)
 FADELESS = dataclasses.replace(SCENARIO, fading=False, edge_energy_budget=8.0, speed_limit="disc")
 TWO_HELPERS = dataclasses.replace(SCENARIO, helper_starts=((-60.0, -60.0), (60.0, -60.0)))
 LEARNERS = [Learner("hybrid", 1), Learner("relay", 2), Learner("jamming", 3)]
+SMALL: dict[str, Any] = {"replay_size": 30, "batch_size": 8}
+"""So that most tests here ask for the same program, which is compiled once."""
 CASES = [
     ("ddpg", SCENARIO, "sum_rate"),
     ("ddpg_robust", SCENARIO, "sum_rate"),
@@ -45,7 +48,7 @@ compared, and no flight is imagined that it would choose."""
 
 
 def cohort(
-    name: str, scenario: Scenario = SCENARIO, reward: str = "sum_rate", batch_size: int = 8
+    name: str, scenario: Scenario = SCENARIO, reward: str = "sum_rate", **changes: Any
 ) -> Cohort:
     guide = Guide(warm_up_episodes=3, update_every=2, repeat_every=2, imagined_flights=0)
     short: dict[str, Any] = {"guide": guide} if name.endswith("robust") else {}
@@ -54,11 +57,10 @@ def cohort(
     return Cohort(
         scenario,
         LEARNERS,
-        ALGORITHMS[name](hidden_sizes=(12, 8), **short),
-        replay_size=30,
-        batch_size=batch_size,
+        ALGORITHMS[name](hidden_sizes=(12,), **short),
         device=None,
         reward=as_reward(reward),
+        **(SMALL | changes),
     )
 
 
@@ -139,12 +141,12 @@ def test_nothing_is_compiled_before_every_slot_is_followed_by_an_update() -> Non
 
 def trained(learners: list[Learner], **changes: Any) -> Training:
     parameters = TrainingParameters(
-        num_episodes=6, replay_size=20, batch_size=8, evaluation_every=2, evaluation_episodes=4
+        num_episodes=8, evaluation_every=2, evaluation_episodes=4, **SMALL
     )
     return Training(
         SCENARIO,
         learners,
-        ALGORITHMS["ddpg"](hidden_sizes=(16, 8)),
+        ALGORITHMS["ddpg"](hidden_sizes=(12,)),
         dataclasses.replace(parameters, **changes),
     )
 
@@ -155,7 +157,7 @@ def trained(learners: list[Learner], **changes: Any) -> Training:
         pytest.param(  # who share their luck
             *(1, [Learner(scheme, 4) for scheme in MODE_RULES]), marks=pytest.mark.slow
         ),
-        (2, [Learner("hybrid", seed) for seed in range(4)]),
+        (2, [*LEARNERS, *(Learner(scheme, 4) for scheme in MODE_RULES)]),
     ],
 )
 def test_a_compiled_training_agrees_with_an_eager_one(
@@ -173,8 +175,7 @@ def test_a_compiled_training_agrees_with_an_eager_one(
 
 
 def test_disturbing_one_learner_leaves_the_others_bit_for_bit_in_compiled_slots() -> None:
-    learners = [Learner("hybrid", seed) for seed in range(3)]
-    plain, disturbed = (trained(learners, compile="always", cohorts=1) for _ in range(2))
+    plain, disturbed = (trained(LEARNERS, compile="always", cohorts=1) for _ in range(2))
     for parameter in disturbed.cohorts[0].algorithm.loss.parameters():
         parameter.data[1].add_(0.1)
     list(plain.episodes())
@@ -188,7 +189,7 @@ def test_disturbing_one_learner_leaves_the_others_bit_for_bit_in_compiled_slots(
 
 def test_a_restored_compiled_training_continues_bit_for_bit() -> None:
     whole, interrupted, continued = (
-        trained(LEARNERS, compile="always", cohorts=1, num_episodes=8) for _ in range(3)
+        trained(LEARNERS, compile="always", cohorts=1) for _ in range(3)
     )
     rewards = [episode.accumulated_reward for episode in whole.episodes()]
     episodes = interrupted.episodes()
@@ -205,9 +206,7 @@ def test_a_restored_compiled_training_continues_bit_for_bit() -> None:
 @pytest.mark.slow
 def test_mixed_horizons_and_schemes_compiled_on_threads_agree_with_eager_ones() -> None:
     mixed = [Learner("hybrid", 1, 3), Learner("relay", 1), Learner("jamming", 2, 3), Learner()]
-    eager, graph = (
-        trained(mixed, compile=choice, cohorts=2, num_episodes=8) for choice in ("never", "always")
-    )
+    eager, graph = (trained(mixed, compile=choice, cohorts=2) for choice in ("never", "always"))
     for one, two in zip(eager.episodes(), graph.episodes(), strict=True):
         torch.testing.assert_close(
             one.accumulated_reward, two.accumulated_reward, rtol=1e-3, atol=1e-3
@@ -215,24 +214,36 @@ def test_mixed_horizons_and_schemes_compiled_on_threads_agree_with_eager_ones() 
     assert all(cohort.is_compiled for cohort in graph.cohorts)
 
 
-def test_where_the_compiler_fails_training_goes_on_without_it(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+@pytest.fixture
+def broken_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
+    """One that is found and does not work, where nothing was compiled before."""
     broken = tmp_path / "g++"
     broken.write_text("#!/bin/sh\necho 'fatal error: Python.h: No such file' >&2\nexit 1\n")
     broken.chmod(0o755)
     monkeypatch.setenv("TORCHINDUCTOR_CACHE_DIR", str(tmp_path / "empty-cache"))
+    with torch._inductor.config.patch({"cpp.cxx": (str(broken),)}):
+        yield
+
+
+@pytest.mark.usefixtures("broken_compiler")
+def test_where_the_compiler_fails_training_goes_on_without_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(training_module, "COMPILE_SECONDS", 0.0)
     plain, other = (trained(LEARNERS, compile=choice) for choice in ("never", "auto"))
     expected = list(plain.episodes())
-    refusal = r"^compile = 'always': expected a working C\+\+ compiler [^\n]*$"
-    with torch._inductor.config.patch({"cpp.cxx": (str(broken),)}):
-        with pytest.warns(UserWarning, match="training goes on without compiling"):
-            episodes = list(other.episodes())
-        with pytest.raises(InputError, match=refusal):
-            list(trained(LEARNERS, compile="always").episodes())
+    with pytest.warns(UserWarning, match="training goes on without compiling"):
+        episodes = list(other.episodes())
     for one, two in zip(expected, episodes, strict=True):
         assert torch.equal(one.accumulated_reward, two.accumulated_reward)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("broken_compiler")
+def test_where_the_compiler_fails_a_training_that_needs_it_is_refused() -> None:
+    refusal = r"^compile = 'always': expected a working C\+\+ compiler [^\n]*$"
+    with pytest.raises(InputError, match=refusal):
+        list(trained(LEARNERS, compile="always").episodes())
 
 
 def test_compiling_pays_for_long_trainings_only() -> None:

@@ -41,9 +41,10 @@ def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
         evaluation_episodes=1,
     )
     training = Training(EASY, [Learner("jamming", i) for i in range(3)], algorithm, parameters)
-    list(training.episodes())
     optimum = solve_optimum(EASY, ["jamming"], resolution=2.0)["jamming"].value
-    assert training.best_evaluation.median().item() > 0.85 * optimum
+    assert any(
+        training.best_evaluation.median().item() > 0.85 * optimum for _ in training.episodes()
+    )
 
 
 @pytest.mark.slow

@@ -19,13 +19,14 @@ from recipe_calls import TINY_COMPARISON, Call, Refusal
 Printed = pytest.CaptureFixture[str]
 
 TWO = ["algorithm=[ddpg,sac]", "scenario=two_clusters", "scheme=[hybrid,relay]", *TINY_COMPARISON]
+ONE = ["algorithm=ddpg", *TWO[1:], "training.cohorts=1"]
 SHARDS = {"ddpg_two_clusters_T8", "sac_two_clusters_T8"}
 
 
 def test_a_comparison_trains_prints_keeps_and_draws(
-    call: Call, tmp_path: Path, capsys: Printed
+    call: Call, once: Call, tmp_path: Path, capsys: Printed
 ) -> None:
-    call("compare", *TWO)
+    once("compare", *TWO)
     here, printed = tmp_path / "here", capsys.readouterr().out
     results = pd.read_parquet(here / "results.parquet")
     identity = ["algorithm", "scenario", "scheme", "num_slots", "seed"]
@@ -60,8 +61,10 @@ def test_a_comparison_trains_prints_keeps_and_draws(
     assert proposed == pytest.approx(own["sum_rate"].mean(), rel=1e-5)
 
 
-def test_only_what_is_missing_is_done_again(call: Call, tmp_path: Path, capsys: Printed) -> None:
-    call("compare", *TWO)
+def test_only_what_is_missing_is_done_again(
+    call: Call, once: Call, tmp_path: Path, capsys: Printed
+) -> None:
+    once("compare", *TWO)
     here, shards = tmp_path / "here", tmp_path / "here" / "shards"
     results = pd.read_parquet(here / "results.parquet").drop(columns="seconds")
     kept = [*(shards / "ddpg_two_clusters_T8").rglob("*"), *(here / "optima").iterdir()]
@@ -82,8 +85,10 @@ def test_only_what_is_missing_is_done_again(call: Call, tmp_path: Path, capsys: 
     assert [file.stat().st_mtime_ns for file in kept] == written
 
 
-def test_what_is_damaged_is_told_and_made_anew(call: Call, tmp_path: Path, capsys: Printed) -> None:
-    call("compare", *TWO)
+def test_what_is_damaged_is_told_and_made_anew(
+    call: Call, once: Call, tmp_path: Path, capsys: Printed
+) -> None:
+    once("compare", *TWO)
     here, before = tmp_path / "here", capsys.readouterr().out
     shard, optimum = here / "shards/sac_two_clusters_T8", here / "optima/two_clusters.parquet"
     for file in (shard / "curves.parquet", optimum):
@@ -119,16 +124,15 @@ def test_a_shard_that_fails_is_named_and_tried_again(
 
 @pytest.mark.parametrize(("flown", "learners"), [(0, range(4)), (2, [3])])
 def test_learners_that_stop_are_named_with_what_their_last_good_weights_earn(
-    call: Call, tmp_path: Path, capsys: Printed, flown: int, learners: Sequence[int]
+    call: Call, once: Call, tmp_path: Path, capsys: Printed, flown: int, learners: Sequence[int]
 ) -> None:
     shard = tmp_path / "here" / "shards" / "ddpg_two_clusters_T8"
-    one = ["algorithm=ddpg", *TWO[1:], "training.cohorts=1"]
-    call("compare", *one)
+    once("compare", *ONE)
     configuration = RunDirectory(shard).configuration()
     shutil.rmtree(shard)
     leave_overflowing(shard.with_name(f"{shard.name}.partial"), configuration, flown, learners)
     capsys.readouterr()
-    call("compare", *one)
+    call("compare", *ONE)
     printed = capsys.readouterr()
     lines = [line for line in printed.out.splitlines() if "stopped in episode" in line]
     results = pd.read_parquet(tmp_path / "here" / "results.parquet")
@@ -138,7 +142,7 @@ def test_learners_that_stop_are_named_with_what_their_last_good_weights_earn(
         assert line.startswith(f"DDPG, two_clusters, T = 8, {own['scheme']}, seed {own['seed']} ")
         assert line.endswith(f" count: {100 * own['fraction']:.1f} % of the optimum")
     assert len(printed.err.splitlines()) == len(learners)
-    call("compare", *one)
+    call("compare", *ONE)
     assert capsys.readouterr().out == printed.out
 
 
@@ -247,20 +251,19 @@ def test_ray_is_asked_for_with_its_extra(refusal: Refusal, monkeypatch: pytest.M
 
 
 def test_an_older_comparison_is_taken_up_and_its_shards_may_not_be_cut_anew(
-    call: Call, refusal: Refusal, tmp_path: Path
+    call: Call, once: Call, refusal: Refusal, tmp_path: Path
 ) -> None:
-    one = [*TINY_COMPARISON, "algorithm=ddpg", "scenario=two_clusters", "scheme=[hybrid,relay]"]
-    call("compare", *one)
+    once("compare", *ONE)
     config = tmp_path / "here" / "config.yaml"
     lines = config.read_text().splitlines(keepends=True)
     added = ("shard_learners:", "engine:", "address:", "retries:")
     unknown = (*added, "    coverage_blur:")
     config.write_text("".join(line for line in lines if not line.startswith(unknown)))
     shards = {path.name for path in (tmp_path / "here" / "shards").iterdir()}
-    call("compare", *one, "retries=0")
+    call("compare", *ONE, "retries=0")
     assert {path.name for path in (tmp_path / "here" / "shards").iterdir()} == shards
     line = "expected a comparison with shard_learners = 3 (there it is 60)"
-    assert line in refusal("compare", *one, "shard_learners=3")
+    assert line in refusal("compare", *ONE, "shard_learners=3")
 
 
 def test_learners_that_do_not_fit_one_worker_are_shared(call: Call, tmp_path: Path) -> None:

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from recipe_calls import TINY, Call, Refusal
+from recipe_calls import FEW, SHORT, Call, Refusal
 
 
 def test_figures_are_drawn_from_a_finished_run(
-    call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    call: Call, once: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    call("train", "hydra.run.dir=run", *TINY)
+    once("train", "hydra.run.dir=run", *SHORT)
     call("draw", "run=run", "figures=sum_rate_maps")
     figures = tmp_path / "run" / "figures"
     assert {path.name for path in figures.iterdir()} == {
@@ -26,16 +26,14 @@ def test_figures_are_drawn_from_a_finished_run(
 
 @pytest.mark.parametrize("name", ["evaluation.json", "flights.parquet"])
 def test_a_directory_where_a_result_belongs_is_answered_by_one_line(
-    call: Call, refusal: Refusal, tmp_path: Path, name: str
+    once: Call, refusal: Refusal, tmp_path: Path, name: str
 ) -> None:
-    call("train", "hydra.run.dir=run", *TINY)
+    once("train", "hydra.run.dir=run", *SHORT)
+    once("evaluate", "run=run", *FEW)
+    (tmp_path / "run" / name).unlink()
     (tmp_path / "run" / name).mkdir()
     line = f"{name} = 'run/{name}': expected a file or none, not a directory"
     assert line in refusal("evaluate", "run=run")
-    (tmp_path / "run" / name).rename(tmp_path / "elsewhere")
-    call("evaluate", "run=run", "evaluation.episodes=4", "evaluation.resolution=10")
-    (tmp_path / "run" / name).unlink()
-    (tmp_path / "elsewhere").rename(tmp_path / "run" / name)
     assert f"run/{name}: expected " in refusal("draw", "run=run", "figures=[animation]")
 
 
@@ -49,18 +47,23 @@ def test_a_directory_where_a_result_belongs_is_answered_by_one_line(
     ],
 )
 def test_a_mistake_is_answered_by_one_line(
-    call: Call, refusal: Refusal, tmp_path: Path, arguments: list[str], line: str
+    once: Call, refusal: Refusal, tmp_path: Path, arguments: list[str], line: str
 ) -> None:
-    call("train", "hydra.run.dir=run", *TINY)
+    once("train", "hydra.run.dir=run", *SHORT)
     assert line in refusal("draw", *arguments)
     assert not (tmp_path / "nowhere").exists()
 
 
 @pytest.mark.parametrize("damage", ["noise", "a directory", "a pipe"])
 def test_damaged_metrics_leave_a_figure_out_and_refuse_it_where_it_is_asked_for(
-    call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: str
+    call: Call,
+    once: Call,
+    refusal: Refusal,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    damage: str,
 ) -> None:
-    call("train", "hydra.run.dir=run", *TINY)
+    once("train", "hydra.run.dir=run", *SHORT)
     metrics = tmp_path / "run" / "metrics.csv"
     metrics.unlink()
     if damage == "noise":
@@ -76,8 +79,8 @@ def test_damaged_metrics_leave_a_figure_out_and_refuse_it_where_it_is_asked_for(
     assert "figure learning_curves is left out: metrics = " in capsys.readouterr().out
 
 
-def test_a_pipe_is_not_waited_for(call: Call, refusal: Refusal, tmp_path: Path) -> None:
-    call("train", "hydra.run.dir=run", *TINY)
+def test_a_pipe_is_not_waited_for(once: Call, refusal: Refusal, tmp_path: Path) -> None:
+    once("train", "hydra.run.dir=run", *SHORT)
     os.mkfifo(tmp_path / "run" / "evaluation.json")
     line = "figure energy: run/evaluation.json: expected an evaluation in JSON"
     assert line in refusal("draw", "run=run", "figures=energy")

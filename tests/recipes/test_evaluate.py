@@ -9,9 +9,8 @@ import pytest
 
 from hyuav import Scenario
 from hyuav.references import bounds
-from recipe_calls import TINY, Call, Refusal
+from recipe_calls import FEW, TINY, Call, Refusal
 
-FEW = ("evaluation.episodes=4", "evaluation.resolution=10")
 SHORT = (*TINY, "training.compile=never")
 
 
@@ -21,23 +20,25 @@ def summary(directory: Path) -> dict[str, Any]:
 
 
 @pytest.fixture
-def trained(call: Call, tmp_path: Path) -> Path:
+def trained(once: Call, tmp_path: Path) -> Path:
     """A learner for T = 8, of a scenario with T = 20."""
-    call("train", "num_slots=8", "hydra.run.dir=run", *SHORT)
+    once("train", "num_slots=8", "hydra.run.dir=run", *SHORT)
     return tmp_path / "run"
 
 
-def test_learners_fly_by_default_as_long_as_they_were_trained(call: Call, trained: Path) -> None:
-    call("evaluate", "run=run", *FEW)
+def test_learners_fly_by_default_as_long_as_they_were_trained(
+    call: Call, once: Call, trained: Path
+) -> None:
+    once("evaluate", "run=run", *FEW)
     assert summary(trained)["num_slots"] == 8
     call("draw", "run=run", "figures=[trajectories,learning_curves]")
     assert (trained / "figures" / "learning_curves.pdf").exists()
 
 
 def test_a_policy_flies_elsewhere_beside_the_optimum_there_and_loses_nothing_of_its_own(
-    call: Call, trained: Path, capsys: pytest.CaptureFixture[str]
+    call: Call, once: Call, trained: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    call("evaluate", "run=run", *FEW)
+    once("evaluate", "run=run", *FEW)
     before = (trained / "evaluation.json").read_bytes()
     call("evaluate", "run=run", "scenario=random_disk", "scenario.num_slots=9", *FEW)
     place = trained / "elsewhere" / "random_disk_T9_trained_for_T8"

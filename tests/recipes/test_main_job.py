@@ -13,13 +13,12 @@ from hyuav.experiments.schemes import LABELS
 from hyuav.physics.scenario import PRESETS
 from hyuav.viz.paper.gallery import FIGURES
 from offline_wandb import history, offline_runs, recorded
-from recipe_calls import TINY, Call, Refusal
+from recipe_calls import FEW, TINY, Call, Refusal
 
 JOB = [
     *TINY,
     "candidates=1",
-    "evaluation.episodes=4",
-    "evaluation.resolution=5",
+    *FEW,
     "scenario.num_slots=8",
     "hydra.run.dir=job",
 ]

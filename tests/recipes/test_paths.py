@@ -13,7 +13,7 @@ from hyuav._support import start
 from hyuav.experiments import train as trainings
 from hyuav.experiments.quoting import in_quotes
 from hyuav.experiments.run_directory import RunDirectory
-from recipe_calls import TINY, Call, Refusal
+from recipe_calls import FEW, TINY, Call, Refusal
 
 OWN = """
 from pydantic.dataclasses import dataclass
@@ -127,8 +127,7 @@ def test_paths_are_told_from_where_the_command_was_called_whatever_hydra_does(
     call("train", there, "hydra.run.dir=first", *SHORT)
     call("train", there, "warm_start=first", "hydra.run.dir=second", *SHORT)
     call("train", there, "resume=second", "training.num_episodes=5")
-    few = ["evaluation.episodes=4", "evaluation.resolution=10"]
-    call("evaluate", there, "run=[first,second]", "output=both", *few)
+    call("evaluate", there, "run=[first,second]", "output=both", *FEW)
     capsys.readouterr()
     call("draw", there, "run=second", "figures=learning_curves")
     assert capsys.readouterr().out == "figures: second/figures\n"

@@ -14,12 +14,10 @@ from hyuav import Scenario, clusters
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS
 from hyuav.learning.ddpg import DDPG
-from recipe_calls import TINY, Call, Refusal
+from recipe_calls import FEW, SHORT, TINY, Call, Refusal
 
 NAMES = "ddpg, ddpg_robust, maddpg, sac, sac_robust, td3, td3_robust"
 RECIPES = Path(__file__).parents[2] / "recipes"
-SHORT = (*TINY, "scenario.num_slots=10")
-FEW = ("evaluation.episodes=4", "evaluation.resolution=10")
 
 
 def test_training_keeps_a_run(call: Call, tmp_path: Path) -> None:
@@ -44,9 +42,7 @@ def test_schemes_horizons_and_seeds_train_as_one_run(call: Call, tmp_path: Path)
     assert list(zip(last["scheme"], last["num_slots"], last["seed"], strict=True)) == expected
     assert (last["slots"] == 4 * last["num_slots"]).all()
     assert last["best_evaluation"].notna().all()
-    call(
-        "evaluate", f"run={run}", "num_slots=6", "evaluation.episodes=4", "evaluation.resolution=5"
-    )
+    call("evaluate", f"run={run}", "num_slots=6", *FEW)
     summary = json.loads((run / "evaluation.json").read_text())
     assert summary["num_slots"] == 6
     assert summary["schemes"]["ja_ot"]["learners"] == 2
@@ -91,25 +87,25 @@ def test_a_sweep_keeps_a_run_for_each_job(call: Call, tmp_path: Path) -> None:
     assert {run.learners[0].seed for run in runs} == {3, 4}
 
 
-def test_a_run_remembers_all_that_was_asked_for(call: Call, tmp_path: Path) -> None:
-    call("train", "threads=1", "hydra.run.dir=run", *SHORT)
+def test_a_run_remembers_all_that_was_asked_for(once: Call, tmp_path: Path) -> None:
+    once("train", "hydra.run.dir=run", *SHORT)
     config = (tmp_path / "run" / "config.yaml").read_text()
     assert "threads: 1" in config
     assert "mode: disabled" in config
 
 
 def test_an_evaluation_needs_a_place_to_write_to(
-    call: Call, refusal: Refusal, tmp_path: Path
+    once: Call, refusal: Refusal, tmp_path: Path
 ) -> None:
-    call("train", "hydra.run.dir=run", *SHORT)
+    once("train", "hydra.run.dir=run", *SHORT)
     (tmp_path / "file").write_text("")
     assert "output = 'file" in refusal("evaluate", "run=run", "output=file")
 
 
 def test_runs_that_cannot_be_evaluated_leave_nothing_behind(
-    call: Call, refusal: Refusal, tmp_path: Path
+    once: Call, refusal: Refusal, tmp_path: Path
 ) -> None:
-    call("train", "hydra.run.dir=run", *SHORT)
+    once("train", "hydra.run.dir=run", *SHORT)
     (tmp_path / "loop").symlink_to("loop")
     assert "run = 'loop': expected a run directory" in refusal("evaluate", "run=[run,loop]")
     (tmp_path / "run" / "checkpoints" / "best.pt").unlink()
@@ -150,20 +146,22 @@ def test_the_same_call_goes_on_and_says_so(
     assert pd.read_csv(tmp_path / "run" / "metrics.csv").equals(own)
 
 
-def test_training_starts_from_another_runs_weights(call: Call, tmp_path: Path) -> None:
-    call("train", "hydra.run.dir=first", *SHORT)
-    call("train", "warm_start=first", "learners=2", "hydra.run.dir=second", *SHORT)
-    first = pd.read_csv(tmp_path / "first" / "metrics.csv")["best_evaluation"].max()
+def test_training_starts_from_another_runs_weights(call: Call, once: Call, tmp_path: Path) -> None:
+    once("train", "hydra.run.dir=run", *SHORT)
+    call("train", "warm_start=run", "learners=2", "hydra.run.dir=second", *SHORT)
+    first = pd.read_csv(tmp_path / "run" / "metrics.csv")["best_evaluation"].max()
     second = pd.read_csv(tmp_path / "second" / "metrics.csv")["best_evaluation"]
     assert second.dropna().min() >= first - 1e-4
 
 
 def test_saved_runs_are_evaluated_offline(
-    call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    call: Call, once: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for scheme in ("hybrid", "relay", "jamming"):
+    once("train", "hydra.run.dir=run", *SHORT)
+    (tmp_path / "run").rename(tmp_path / "hybrid")
+    for scheme in ("relay", "jamming"):
         call("train", f"scheme={scheme}", f"hydra.run.dir={scheme}", *SHORT)
-    few = ["evaluation.episodes=5", "evaluation.resolution=5"]
+    few = ["evaluation.episodes=5", "evaluation.resolution=10"]
     call("evaluate", "run=[hybrid,relay,jamming]", "output=together", *few)
     summary = json.loads((tmp_path / "together" / "evaluation.json").read_text())
     assert set(summary["schemes"]) == {
@@ -186,8 +184,7 @@ def test_the_main_job_trains_evaluates_and_draws(call: Call, tmp_path: Path) -> 
         "reproduce",
         "candidates=2",
         "candidate_episodes=2",
-        "evaluation.episodes=4",
-        "evaluation.resolution=5",
+        *FEW,
         "hydra.run.dir=job",
         *SHORT,
     )
@@ -208,7 +205,7 @@ def test_a_straight_flight_too_fast_for_the_horizon_is_left_out_and_named(
     call: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     call("train", "hydra.run.dir=short", *SHORT, "scenario.num_slots=5")
-    call("evaluate", "run=short", "evaluation.episodes=4", "evaluation.resolution=5")
+    call("evaluate", "run=short", *FEW)
     summary = json.loads((tmp_path / "short" / "evaluation.json").read_text())
     assert "ja_lt" not in summary["schemes"]
     assert "Ja-LT is left out" in capsys.readouterr().out
@@ -230,9 +227,14 @@ def test_a_path_is_printed_as_it_is(
     ("name", "shown"), [("[/]", "[/]"), ("\x1b[2J\x1b]0;hacked\n", "?[2J?]0;hacked?")]
 )
 def test_a_scenarios_name_is_printed_as_text_that_no_terminal_obeys(
-    call: Call, capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, shown: str
+    call: Call,
+    once: Call,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    name: str,
+    shown: str,
 ) -> None:
-    call("train", "hydra.run.dir=run", *SHORT)
+    once("train", "hydra.run.dir=run", *SHORT)
     capsys.readouterr()
     config = tmp_path / "run" / "config.yaml"
     OmegaConf.update(content := OmegaConf.load(config), "scenario.name", name)
@@ -356,9 +358,10 @@ def test_a_saved_scenario_that_leaves_a_value_open_is_refused(
 
 
 def test_going_on_into_the_runs_own_directory_is_refused_and_loses_nothing(
-    call: Call, refusal: Refusal, tmp_path: Path
+    once: Call, refusal: Refusal, tmp_path: Path
 ) -> None:
-    call("train", "hydra.run.dir=base", *SHORT)
+    once("train", "hydra.run.dir=run", *SHORT)
+    (tmp_path / "run").rename(tmp_path / "base")
     before = sorted((tmp_path / "base").rglob("*"))
     accepted = "device=, threads=, logger.NAME= and training.num_episodes=, not hydra.run.dir"
     hint = '(warm_start="base" begins a new training with its weights)'
@@ -368,9 +371,9 @@ def test_going_on_into_the_runs_own_directory_is_refused_and_loses_nothing(
 
 
 def test_a_finished_training_goes_on_for_more_episodes(
-    call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    call: Call, once: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    call("train", "hydra.run.dir=run", "training.compile=never", *SHORT)
+    once("train", "hydra.run.dir=run", *SHORT)
     capsys.readouterr()
     call("train", "resume=run", "training.num_episodes=6")
     assert "run: this training goes on after episode 4 of 6\n" in capsys.readouterr().out

@@ -59,6 +59,13 @@ def shard(optima: Optima, parent: Path, algorithm: str = "ddpg") -> Shard:
     return Shard(algorithm, configuration, EVALUATION, 0.5, logger, optima, parent)
 
 
+@pytest.fixture(scope="module")
+def finished(optima: Optima, tmp_path_factory: pytest.TempPathFactory) -> Shard:
+    work = shard(optima, tmp_path_factory.mktemp("finished"))
+    work.run()
+    return work
+
+
 def test_the_optima_are_kept_as_they_were_found(optima: Optima) -> None:
     found = solve_optimum(SCENARIO, resolution=EVALUATION.resolution)
     for scheme, optimum in found.items():
@@ -161,9 +168,8 @@ def test_a_shard_trains_and_keeps_its_tables(
         assert (curve["sum_rate"] >= curve["evaluation"] - 1e-5).all()
 
 
-def test_a_shard_of_this_project_is_a_run(optima: Optima, tmp_path: Path) -> None:
-    work = shard(optima, tmp_path)
-    work.run()
+def test_a_shard_of_this_project_is_a_run(finished: Shard) -> None:
+    work = finished
     assert RunDirectory(work.path).configuration() == work.configuration
     assert [file.name for file in (work.path / "checkpoints").iterdir()] == ["best.pt"]
     results = pd.read_parquet(work.path / "results.parquet")
@@ -193,9 +199,10 @@ def test_a_scheme_whose_optimum_earns_nothing_is_refused_before_training(tmp_pat
     assert not (tmp_path / "shards").exists()
 
 
-def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: Path) -> None:
-    whole, broken = shard(optima, tmp_path / "whole"), shard(optima, tmp_path / "broken")
-    whole.run()
+def test_a_broken_attempt_goes_on_from_its_checkpoint(
+    optima: Optima, finished: Shard, tmp_path: Path
+) -> None:
+    broken = shard(optima, tmp_path / "broken")
     run = RunDirectory.create(tmp_path / "broken/ddpg_campus_T6.partial", broken.configuration)
     configuration = broken.configuration
     training = configuration.new_training()
@@ -209,7 +216,7 @@ def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: 
     broken.run()
     assert (broken.path / "config.yaml").stat().st_mtime == 1.0  # not begun again
     for name in ("results.parquet", "curves.parquet"):
-        kept, expected = (pd.read_parquet(own.path / name) for own in (broken, whole))
+        kept, expected = (pd.read_parquet(own.path / name) for own in (broken, finished))
         clock = [column for column in kept.columns if column.startswith("seconds")]
         pd.testing.assert_frame_equal(
             kept.drop(columns=clock), expected.drop(columns=clock), check_exact=True
@@ -218,14 +225,13 @@ def test_a_broken_attempt_goes_on_from_its_checkpoint(optima: Optima, tmp_path: 
 
 @pytest.mark.parametrize(("flown", "learners"), [(0, [1]), (3, [1]), (3, [0, 1, 2, 3])])
 def test_learners_that_stop_count_with_their_last_good_weights(
-    optima: Optima, tmp_path: Path, flown: int, learners: list[int]
+    optima: Optima, finished: Shard, tmp_path: Path, flown: int, learners: list[int]
 ) -> None:
-    whole, work = shard(optima, tmp_path / "whole"), shard(optima, tmp_path / "stopped")
-    whole.run()
+    work = shard(optima, tmp_path / "stopped")
     partial = tmp_path / "stopped" / f"{work.name}.partial"
     leave_overflowing(partial, work.configuration, flown, learners)
     work.run()
-    results, expected = (pd.read_parquet(own.path / "results.parquet") for own in (work, whole))
+    results, expected = (pd.read_parquet(own.path / "results.parquet") for own in (work, finished))
     stopped = results.index.isin(learners)
     assert results["stopped"].isna().tolist() == [not own for own in stopped]
     assert (results.loc[stopped, "stopped"] > flown).all()
@@ -238,13 +244,6 @@ def test_learners_that_stop_count_with_their_last_good_weights(
         assert np.isfinite(learner["sum_rate"])
         own = curves[(curves["scheme"] == learner["scheme"]) & (curves["seed"] == learner["seed"])]
         assert own["episode"].tolist() == ([2] if flown else [])
-
-
-@pytest.fixture(scope="module")
-def finished(optima: Optima, tmp_path_factory: pytest.TempPathFactory) -> Shard:
-    work = shard(optima, tmp_path_factory.mktemp("finished"))
-    work.run()
-    return work
 
 
 def cut(file: Path, share: float = 0.6) -> None:

@@ -62,9 +62,25 @@ def track(
     return training
 
 
-def test_metrics_are_kept_as_columns_a_row_per_episode_and_learner(tmp_path: Path) -> None:
-    training = track(tmp_path, "disabled")
-    metrics = RunDirectory(tmp_path).metrics()
+@pytest.fixture(scope="module")
+def disabled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Training]:
+    """What nobody changes."""
+    directory = tmp_path_factory.mktemp("disabled")
+    return directory, track(directory, "disabled")
+
+
+@pytest.fixture(scope="module")
+def offline(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Training]:
+    """What nobody changes."""
+    directory = tmp_path_factory.mktemp("offline")
+    return directory, track(directory, "offline")
+
+
+def test_metrics_are_kept_as_columns_a_row_per_episode_and_learner(
+    disabled: tuple[Path, Training],
+) -> None:
+    directory, training = disabled
+    metrics = RunDirectory(directory).metrics()
     assert metrics[["episode", "learner", "scheme"]].to_numpy().tolist() == [
         [episode, learner, scheme]
         for episode in range(1, 6)
@@ -81,18 +97,19 @@ def test_metrics_are_kept_as_columns_a_row_per_episode_and_learner(tmp_path: Pat
     assert metrics["loss_critic"].tail(2).notna().all()
 
 
-def test_checkpoints_are_written(tmp_path: Path) -> None:
-    training = track(tmp_path, "disabled")
-    run = RunDirectory(tmp_path)
+def test_checkpoints_are_written(disabled: tuple[Path, Training]) -> None:
+    directory, training = disabled
+    run = RunDirectory(directory)
     state = load_checkpoint(run.last_checkpoint, "training")["training"]
     assert [cohort["episode"] for cohort in state["cohorts"]] == [5] * len(training.cohorts)
     best = run.best_weights()
     assert all(torch.equal(best[name], training.best_weights[name]) for name in best)
 
 
-def test_a_run_that_is_still_being_written_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
-    track(tmp_path, "offline")
-    (file,) = offline_runs(tmp_path)
+def test_a_run_that_is_still_being_written_is_read_as_far_as_it_goes(
+    offline: tuple[Path, Training],
+) -> None:
+    (file,) = offline_runs(offline[0])
     content = file.read_bytes()
     whole = list(records_of(content))
     for length in range(0, len(content), 37):
@@ -101,10 +118,10 @@ def test_a_run_that_is_still_being_written_is_read_as_far_as_it_goes(tmp_path: P
         assert len(part) < len(whole)
 
 
-def test_the_same_metrics_reach_weights_and_biases_offline(tmp_path: Path) -> None:
-    track(tmp_path, "offline")
-    history = [row for row in logged_history(tmp_path) if "hybrid/accumulated_reward" in row]
-    metrics = RunDirectory(tmp_path).metrics()
+def test_the_same_metrics_reach_weights_and_biases_offline(offline: tuple[Path, Training]) -> None:
+    directory, _ = offline
+    history = [row for row in logged_history(directory) if "hybrid/accumulated_reward" in row]
+    metrics = RunDirectory(directory).metrics()
     for scheme in ("hybrid", "relay"):
         for column in ("accumulated_reward", "evaluation", "loss_critic"):
             logged = [row[f"{scheme}/{column}"] for row in history if f"{scheme}/{column}" in row]
@@ -112,14 +129,14 @@ def test_the_same_metrics_reach_weights_and_biases_offline(tmp_path: Path) -> No
             assert logged == pytest.approx(kept.tolist())
 
 
-def test_nothing_is_logged_where_it_is_disabled(tmp_path: Path) -> None:
-    track(tmp_path, "disabled")
-    assert not (tmp_path / "wandb").exists()
+def test_nothing_is_logged_where_it_is_disabled(disabled: tuple[Path, Training]) -> None:
+    assert not (disabled[0] / "wandb").exists()
 
 
-def test_rewards_have_episodes_as_their_axis_and_losses_slots(tmp_path: Path) -> None:
-    track(tmp_path, "offline")
-    (file,) = offline_runs(tmp_path)
+def test_rewards_have_episodes_as_their_axis_and_losses_slots(
+    offline: tuple[Path, Training],
+) -> None:
+    (file,) = offline_runs(offline[0])
     axes = {metric.name: metric.step_metric for metric in recorded(file, "metric")}
     assert axes["hybrid/evaluation"] == axes["relay/accumulated_reward"] == "episode"
     assert axes["hybrid/loss_critic"] == axes["relay/loss_actor"] == "slots"
@@ -137,10 +154,10 @@ def test_learners_of_different_horizons_count_their_own_slots(tmp_path: Path) ->
     assert [row["hybrid_T6/slots"] for row in history(file)] == [6, 12, 18, 24, 30]
 
 
-def test_the_summary_keeps_what_a_metric_is_judged_by(tmp_path: Path) -> None:
-    training = track(tmp_path, "offline")
-    (file,) = offline_runs(tmp_path)
-    kept, metrics = summary(file), RunDirectory(tmp_path).metrics()
+def test_the_summary_keeps_what_a_metric_is_judged_by(offline: tuple[Path, Training]) -> None:
+    directory, training = offline
+    (file,) = offline_runs(directory)
+    kept, metrics = summary(file), RunDirectory(directory).metrics()
     own = metrics[metrics["scheme"] == "hybrid"]
     assert kept["hybrid/evaluation"]["max"] == pytest.approx(own["evaluation"].max())
     assert kept["hybrid/loss_critic"]["min"] == pytest.approx(own["loss_critic"].min())
@@ -149,9 +166,11 @@ def test_the_summary_keeps_what_a_metric_is_judged_by(tmp_path: Path) -> None:
     assert kept["best_evaluation"] == pytest.approx(mean, rel=1e-5)  # which sweeps go by
 
 
-def test_checkpoints_are_versions_of_one_artifact_that_can_be_uploaded(tmp_path: Path) -> None:
-    track(tmp_path, "offline")
-    (file,) = offline_runs(tmp_path)
+def test_checkpoints_are_versions_of_one_artifact_that_can_be_uploaded(
+    offline: tuple[Path, Training],
+) -> None:
+    directory, _ = offline
+    (file,) = offline_runs(directory)
     (run,) = recorded(file, "run")
     last, best = recorded(file, "artifact")
     for artifact, alias in ((last, "last"), (best, "best")):
@@ -161,7 +180,7 @@ def test_checkpoints_are_versions_of_one_artifact_that_can_be_uploaded(tmp_path:
         assert json.loads(artifact.metadata)["episodes"] == 5
         (entry,) = artifact.manifest.contents
         assert Path(entry.local_path).read_bytes() == (
-            (tmp_path / "checkpoints" / f"{alias}.pt").read_bytes()
+            (directory / "checkpoints" / f"{alias}.pt").read_bytes()
         )
 
 

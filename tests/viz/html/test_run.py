@@ -70,7 +70,7 @@ def test_each_horizon_has_a_table_and_flights(job: RunDirectory) -> None:
     assert {"T = 12: Proposed", "T = 12: Optimum", "T = 8: Optimum", "T = 8: Re-LT"} <= set(names)
     assert names[0] == "T = 12: Proposed"
     assert not any("No helper" in name for name in names)
-    assert len(picture.figures["T = 8: Optimum"].frames) == 8
+    assert len(picture.figures["T = 8: Optimum"]["frames"]) == 8
 
 
 def test_a_damaged_evaluation_of_a_horizon_leaves_the_others(job: RunDirectory) -> None:

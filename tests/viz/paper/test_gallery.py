@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import json
+import shutil
 from pathlib import Path
 
 import pandas as pd
@@ -41,7 +42,7 @@ def drawn(run: RunDirectory) -> set[str]:
     return stems
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def configuration(scenario: Scenario) -> RunConfiguration:
     return RunConfiguration(
         "two_clusters",
@@ -53,9 +54,16 @@ def configuration(scenario: Scenario) -> RunConfiguration:
     )
 
 
+@pytest.fixture(scope="module")
+def trained(
+    configuration: RunConfiguration, tmp_path_factory: pytest.TempPathFactory
+) -> RunDirectory:
+    return train(tmp_path_factory.mktemp("trained") / "run", configuration, OFF, console())
+
+
 @pytest.fixture
-def run(configuration: RunConfiguration, tmp_path: Path) -> RunDirectory:
-    return train(tmp_path / "run", configuration, OFF, console())
+def run(trained: RunDirectory, tmp_path: Path) -> RunDirectory:
+    return RunDirectory(shutil.copytree(trained.path, tmp_path / "run"))
 
 
 def test_a_training_alone_gives_what_needs_no_evaluation(run: RunDirectory) -> None:
@@ -171,10 +179,10 @@ def test_of_damaged_metrics_what_can_be_read_is_drawn(run: RunDirectory, damage:
 
 
 def test_runs_within_are_drawn_too_and_the_papers_algorithm_beside(
-    run: RunDirectory, configuration: RunConfiguration
+    run: RunDirectory, trained: RunDirectory
 ) -> None:
-    train(run.path / AS_IN_PAPER, configuration, OFF, console())
-    within = train(run.path / "elsewhere", configuration, OFF, console())
+    shutil.copytree(trained.path, run.path / AS_IN_PAPER)
+    within = RunDirectory(shutil.copytree(trained.path, run.path / "elsewhere"))
     draw(run, ["learning_curves"], console())
     names = set(pd.read_csv(run.figures / "learning_curves.csv")["training"])
     assert names == {"DDPG", "DDPG, as in the paper"}

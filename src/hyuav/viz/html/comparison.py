@@ -14,7 +14,7 @@ from hyuav.viz.data.flying import fly_first_learner
 from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html.comparison_figures import comparison_figures
 from hyuav.viz.html.document import Page, Picture, Section
-from hyuav.viz.html.player import flight_player
+from hyuav.viz.html.player import plain_player
 from hyuav.viz.html.run import config_section, map_section
 from hyuav.viz.html.tables import algorithms_table, cells_table
 
@@ -68,7 +68,7 @@ def _flights(runs: Sequence[TrainedEntry]) -> Section:
             notes.append(f"{run.path.name} is left out: {error}")
             continue
         text = f"{label(entry)}, {name}, T = {scenario.num_slots}, {scheme_label(scheme)}"
-        figures[text] = flight_player(scenario, evaluation.flights, scheme)
+        figures[text] = plain_player(scenario, evaluation.flights, scheme)
     if not figures:
         return Section("Flights", notes or ["There are no weights to fly by yet."])
     notes.append(

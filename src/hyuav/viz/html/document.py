@@ -5,12 +5,16 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from plotly.io import to_json
 from plotly.offline import get_plotlyjs
+
+Drawing = go.Figure | dict[str, Any]
+"""A figure of Plotly's, or the same in plain values."""
 
 
 class Picture(NamedTuple):
@@ -18,7 +22,7 @@ class Picture(NamedTuple):
 
     title: str
     """Tells what is chosen among."""
-    figures: Mapping[str, go.Figure]
+    figures: Mapping[str, Drawing]
     """By their names."""
     small: bool = False
     """Whether several stand side by side on a wide page."""
@@ -26,7 +30,7 @@ class Picture(NamedTuple):
     @property
     def height(self) -> int:
         """Of the largest in pixels, which is kept free until it is drawn."""
-        return max(int(figure.layout.height) for figure in self.figures.values())
+        return max(int(figure["layout"]["height"]) for figure in self.figures.values())
 
 
 class Section(NamedTuple):
@@ -70,9 +74,9 @@ def render(page: Page) -> str:
     )
 
 
-def _data(figure: go.Figure) -> Markup:
+def _data(figure: Drawing) -> Markup:
     """A figure as JSON that may stand in a script element."""
-    text = str(figure.to_json())
+    text = str(to_json(figure, validate=False))
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
     return Markup(text)

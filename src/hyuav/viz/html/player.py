@@ -1,12 +1,14 @@
 """The flight player: a map with a slot slider, and each slot's links, rates and energies."""
 
+from typing import Any
+
 import pandas as pd
 import plotly.graph_objects as go
 
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import Flight, read_flight, told_modes
 from hyuav.viz.data.schemes import scheme_color, scheme_label
-from hyuav.viz.html.player_layout import animation_controls, layouts, power_axis
+from hyuav.viz.html.player_layout import animation_controls, layouts, power_axis, rearranged
 from hyuav.viz.html.player_map import fixed_on_map, moving_on_map
 from hyuav.viz.html.player_panels import fixed_in_panels, highest, moving_in_panels
 from hyuav.viz.html.style import base_layout, plain
@@ -38,6 +40,29 @@ def flight_player(
     Raises:
         InputError: there is no such flight, or it is not one of this scenario.
     """
+    return go.Figure(plain_player(scenario, flights, scheme, episode, narrow=narrow))
+
+
+def plain_player(
+    scenario: Scenario,
+    flights: pd.DataFrame,
+    scheme: str,
+    episode: int = 0,
+    *,
+    narrow: bool = False,
+) -> dict[str, Any]:
+    """The same in plain values, which no Plotly has checked: that takes most of the time.
+
+    Args:
+        scenario: that was flown.
+        flights: as :func:`flight_player` takes them.
+        scheme: whose flight is shown.
+        episode: which of its flights.
+        narrow: whether the panels stand below the map.
+
+    Raises:
+        InputError: there is no such flight, or it is not one of this scenario.
+    """
     flight = read_flight(scenario, flights, scheme, episode)
     color, num_slots = scheme_color(scheme), flight.num_slots
     fixed = [*fixed_on_map(scenario, flight), *fixed_in_panels(flight)]
@@ -48,28 +73,29 @@ def flight_player(
         ]
         for slot in range(num_slots)
     ]
-    titles = [_title(flight, slot) for slot in range(num_slots)]
-    both = layouts(scenario, num_slots, highest(flight))
-    figure = go.Figure(
-        data=[*fixed, *moving[0]],
-        frames=[
-            {
-                "name": str(slot + 1),
-                "data": moving[slot],
-                "traces": list(range(len(fixed), len(fixed) + len(moving[slot]))),
-                "layout": {"title": {"text": titles[slot]}},
-            }
-            for slot in range(num_slots)
-        ],
-        layout=base_layout() | {"title": {"text": titles[0]}},
-    )
-    figure.update_layout(animation_controls(num_slots))
-    figure.update_layout(both["shared"])
+    titles = [{"title": {"text": _title(flight, slot)}} for slot in range(num_slots)]
+    frames = [
+        {
+            "name": str(slot + 1),
+            "data": moving[slot],
+            "traces": list(range(len(fixed), len(fixed) + len(moving[slot]))),
+            "layout": titles[slot],
+        }
+        for slot in range(num_slots)
+    ]
+    layout = _layout(scenario, flight, narrow=narrow)
+    layout["title"] |= titles[0]["title"]
+    return {"data": [*fixed, *moving[0]], "layout": layout, "frames": frames}
+
+
+def _layout(scenario: Scenario, flight: Flight, *, narrow: bool) -> dict[str, Any]:
+    """All but the title's text."""
+    both = layouts(scenario, flight.num_slots, highest(flight))
+    layout = base_layout() | animation_controls(flight.num_slots) | both["shared"]
     if flight.power_level is not None:
-        figure.update_layout(power_axis(scenario))
-    figure.update_layout(both["narrow" if narrow else "wide"])
-    figure.update_layout(meta={name: both[name] for name in ("wide", "narrow")})
-    return figure
+        layout |= power_axis(scenario)
+    layout["meta"] = {name: both[name] for name in ("wide", "narrow")}
+    return rearranged(layout, both["narrow" if narrow else "wide"])
 
 
 def _title(flight: Flight, slot: int) -> str:

@@ -1,6 +1,7 @@
 """Where the parts of the flight player stand, on a wide page and on a phone."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hyuav.physics.scenario import Scenario
@@ -33,6 +34,22 @@ def layouts(
         "yaxis4": axis("Sum-rate<br>(bps/Hz)", anchor="x4", range=[0, sum_rate], nticks=5),
     }
     return {"shared": shared, "wide": _wide(), "narrow": _narrow()}
+
+
+def rearranged(layout: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A layout with changes named as in a browser: ``xaxis.domain``, ``sliders[0].x``.
+
+    Args:
+        layout: in plain values, which are changed in place.
+        changes: such as those of ``wide`` pages.
+    """
+    for name, value in changes.items():
+        *path, last = re.findall(r"\w+", name)
+        part: Any = layout
+        for step in path:
+            part = part[int(step) if step.isdigit() else step]
+        part[last] = value
+    return layout
 
 
 def power_axis(scenario: Scenario) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from hyuav.viz.data.schemes import scheme_label
 from hyuav.viz.html.curves import MAX_POINTS, QUANTITIES, learning_figure
 from hyuav.viz.html.document import Page, Picture, Section
 from hyuav.viz.html.maps import TITLES, map_figure
-from hyuav.viz.html.player import flight_player
+from hyuav.viz.html.player import plain_player
 from hyuav.viz.html.tables import configuration_tables, scheme_table
 
 _KEPT = "Flights of the evaluation, each scheme's first."
@@ -116,7 +116,7 @@ def _flights(several: Sequence[tuple[Scenario, Evaluation]], note: str) -> Secti
         for scheme in flying_schemes(flown.flights):
             label = f"{horizon}{scheme_label(scheme)}"
             try:
-                figures[label] = flight_player(scenario, flown.flights, scheme)
+                figures[label] = plain_player(scenario, flown.flights, scheme)
             except InputError as error:
                 notes.append(f"{label} is left out: {error}")
     notes.append(

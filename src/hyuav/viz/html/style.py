@@ -1,7 +1,10 @@
 """What all figures of a report share: lines, fonts, axes, and text that stays text."""
 
 import html
+from functools import cache
 from typing import Any
+
+from plotly.io import templates
 
 from hyuav.viz.data.schemes import Line
 
@@ -28,7 +31,7 @@ def translucent(color: str, alpha: float) -> str:
 def base_layout() -> dict[str, Any]:
     """The layout that every figure starts from."""
     return {
-        "template": "plotly_white",
+        "template": _template(),
         "font": FONT | {"size": 12},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
@@ -36,6 +39,13 @@ def base_layout() -> dict[str, Any]:
         "hovermode": "closest",
         "hoverlabel": {"font": FONT | {"size": 12}, "bgcolor": "white"},
     }
+
+
+@cache
+def _template() -> dict[str, Any]:
+    """What Plotly draws with where a figure says nothing, in plain values."""
+    values: dict[str, Any] = templates["plotly_white"].to_plotly_json()
+    return values
 
 
 def axis(title: str, **more: Any) -> dict[str, Any]:

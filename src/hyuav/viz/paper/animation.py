@@ -64,11 +64,13 @@ def animate_flight(scenario: Scenario, flight: Flight, file: Path) -> None:
         writer = PillowWriter(fps=SLOTS_PER_SECOND)
         drawn = Path(elsewhere) / file.name  # Pillow tells the format by the name
         with writer.saving(figure, str(drawn), DPI):
-            for flown in (*range(flight.num_slots + 1), *[flight.num_slots] * SLOTS_HELD):
+            for flown in range(flight.num_slots + 1):
                 over_map.clear()
                 _draw_map(over_map, scenario, flight, flown)
                 over_time.clear()
                 _draw_rates(over_time, flight, flown)
+                writer.grab_frame()
+            for _ in range(SLOTS_HELD):
                 writer.grab_frame()
         write_durably(file, drawn.read_bytes())
 

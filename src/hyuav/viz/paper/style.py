@@ -82,6 +82,7 @@ def save_figure(
         for suffix in ("png", "pdf"):
             drawn = io.BytesIO()
             figure.savefig(drawn, format=suffix)
+            figure.set_layout_engine(None)  # what is laid out once stays where it is
             write_durably(directory / f"{name}.{suffix}", drawn.getbuffer())
     save_tables(directory, name, tables or {})
 
