@@ -11,7 +11,7 @@ import hyuav
 from hyuav._support.errors import InputError, rejection, require_choice
 
 RECIPES = (
-    *("fly", "train", "evaluate", "reproduce", "compare", "regimes", "generalist"),
+    *("fly", "train", "evaluate", "reproduce", "compare", "regimes", "generalist", "families"),
     *("draw", "report", "dashboard"),
 )
 """The commands that are recipes, in the order of the help."""

@@ -20,7 +20,11 @@ from hyuav.physics.scenario import Point, Scenario
 SPLITS = ("training", "validation", "test")
 """Each has scenarios of its own for the same seed."""
 
-_AMPLE: dict[str, Any] = {"ue_energy_budget": 1.0, "edge_energy_budget": 1e4, "helper_energy_budget": 1e6}
+_AMPLE: dict[str, Any] = {
+    "ue_energy_budget": 1.0,
+    "edge_energy_budget": 1e4,
+    "helper_energy_budget": 1e6,
+}
 """In J: budgets that never bind."""
 
 

@@ -56,7 +56,7 @@ class GeneralistNetwork(nn.Module):
             (B, REACH^2), in units of what the best place brings in a slot.
         """
         each = self.each(tokens)
-        nodes = each.new_zeros(len(views), each.shape[-1]).index_add(0, owner, each) / 10.0
+        nodes = each.new_zeros(views.shape[0], each.shape[-1]).index_add(0, owner, each) / 10.0
         left = slots_left.clamp(max=LONGEST)
         clock = F.one_hot(left, LONGEST + 1).to(views.dtype)
         count = left.to(views.dtype).unsqueeze(-1)

@@ -12,8 +12,11 @@ from torch import Tensor
 
 from hyuav._support.errors import InputError, cause, rejection, require_choice
 from hyuav._support.files import write_durably
+from hyuav.learning.export import Signature, export
 from hyuav.learning.generalist.network import GeneralistNetwork
 from hyuav.learning.generalist.policy import GeneralistPolicy
+from hyuav.learning.generalist.scene import REACH, STEPS, VIEW_SIZE, VIEWS
+from hyuav.learning.generalist.tokens import TOKEN_SIZE
 from hyuav.physics.modes import fixed_modes
 from hyuav.physics.scenario import ScenarioLike, as_scenario
 
@@ -51,6 +54,31 @@ class Generalist:
         scenario = as_scenario(scenario)
         fixed_modes(mode_rule, scenario.num_helpers, "mode_rule")
         return GeneralistPolicy(self.network, scenario, mode_rule)
+
+    def export(self, path: str | Path) -> None:
+        """Write the network to a file: ``.onnx``, ``.pt2`` (torch.export) or ``.pt`` (TorchScript).
+
+        Its inputs are those of :meth:`.network.GeneralistNetwork.forward`, for any number of
+        helpers and tokens; its output is ``values_to_go``.
+
+        Raises:
+            InputError: another suffix, a place that cannot be written to, or what writes ONNX is
+                not installed.
+        """
+        examples = {
+            "views": torch.zeros(2, VIEW_SIZE),
+            "tokens": torch.zeros(24, TOKEN_SIZE),
+            "owner": torch.arange(2).repeat_interleave(12),
+            "slots_left": torch.tensor([3, 9]),
+        }
+        free = {
+            "views": {0: "helpers"},
+            "tokens": {0: "tokens"},
+            "owner": {0: "tokens"},
+            "slots_left": {0: "helpers"},
+        }
+        environment = {"views": VIEWS, "reach": REACH, "steps": STEPS, "token": TOKEN_SIZE}
+        export(self.network, path, Signature(examples, free, "values_to_go"), environment)
 
     def save(self, path: str | Path) -> None:
         """Write the weights as NumPy arrays in half precision, ``.npz``, which hold no code.

@@ -205,8 +205,8 @@ class GeneralistTraining:
         fraction = earned / self._validation.optimum
         return Progress(
             self.step,
-            float(loss.total),
-            float(loss.regret),
+            float(loss.total.detach()),
+            float(loss.regret.detach()),
             float(fraction.mean()),
             float(fraction.quantile(0.05)),
             float(fraction.min()),
