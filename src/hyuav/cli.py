@@ -11,7 +11,7 @@ import hyuav
 from hyuav._support.errors import InputError, rejection, require_choice
 
 RECIPES = (
-    *("fly", "train", "evaluate", "reproduce", "compare", "regimes", "generalist", "families"),
+    *("train", "evaluate", "reproduce", "compare", "regimes", "fly", "families", "generalist"),
     *("draw", "report", "dashboard"),
 )
 """The commands that are recipes, in the order of the help."""

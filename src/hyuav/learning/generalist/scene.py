@@ -25,6 +25,9 @@ from hyuav.references.rewards import ExpectedReward
 STEPS = 10
 """Spacings of the lattice that a helper flies along each axis in a slot, at its fastest."""
 
+MOST_SPACINGS = 400
+"""Along one side of the map: a slower helper flies fewer of them in a slot."""
+
 REACH = 2 * STEPS + 1
 """Places within reach along each axis."""
 
@@ -162,7 +165,9 @@ def _scene_of_one(
     others: tuple[Tensor, Tensor],
 ) -> Scenes:
     scenario = physics.scenario
-    spacing = scenario.max_speed * scenario.slot_duration / STEPS
+    spacing = max(
+        scenario.max_speed * scenario.slot_duration / STEPS, scenario.map_side / MOST_SPACINGS
+    )
     grid = grid_over_map(scenario, spacing, helper)
     own = grid.positions().to(physics.dtype)
     places, power = (each.expand(len(own), *each.shape).clone() for each in others)
