@@ -1,5 +1,6 @@
 """How the generalist flies in whole families of scenarios, beside the optimum of each."""
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -11,7 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from rich.console import Console
 
-from hyuav._support.errors import Halted
+from hyuav._support.errors import Halted, ScenarioWarning
 from hyuav._support.files import write_durably
 from hyuav._support.parameters import (
     Count,
@@ -80,6 +81,7 @@ class Chunk:
     def fly(self) -> None:
         """Fly each scenario and write the file."""
         torch.set_num_threads(1)
+        warnings.simplefilter("ignore", ScenarioWarning)  # some bring nothing, and are counted
         rows = [flown(seed, self.options) for seed in self.seeds]
         write_durably(self.file, pd.DataFrame(rows).to_parquet())
 
