@@ -18,6 +18,7 @@ import torch
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 from rich.console import Console
+from torch import Tensor
 
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.parameters import (
@@ -33,6 +34,7 @@ from hyuav._support.parameters import (
 from hyuav._support.registry import is_reference
 from hyuav._support.terminal import print_line
 from hyuav.envs.rewards import SUM_RATE
+from hyuav.experiments.cloning import cloned_weights
 from hyuav.experiments.configuration import (
     Config,
     given,
@@ -46,6 +48,7 @@ from hyuav.experiments.quoting import override
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.tracking import LoggerParameters
 from hyuav.experiments.train import resume, train_or_resume
+from hyuav.learning.generalist.pretrained import PRETRAINED
 from hyuav.learning.learners import Learner
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.modes import ModeRuleName
@@ -69,6 +72,7 @@ class Train(Parameters):
     device: Text = parameter("cpu")
     threads: Threads = parameter(1)
     warm_start: Text | None = parameter(None)
+    """A run or a checkpoint with whose weights to begin; generalist for actors that imitate it."""
     resume: Text | None = parameter(None)
     """Directory of a training with which to go on as it was configured, or for more episodes."""
 
@@ -107,9 +111,18 @@ def main(config: Config, directory: Path) -> None:
             console,
             device=options.device,
             request=config,
-            initial_weights=lambda: None if start is None else saved_weights(start),
+            initial_weights=lambda: beginning(start, configuration),
         )
     tell(run, console)
+
+
+def beginning(start: str | None, configuration: RunConfiguration) -> dict[str, Tensor] | None:
+    """The weights with which a training begins, where these are not fresh."""
+    if start is None:
+        return None
+    if start in PRETRAINED and not Path(start).exists():
+        return cloned_weights(configuration)
+    return saved_weights(start)
 
 
 def go_on(path: str, config: Config) -> None:

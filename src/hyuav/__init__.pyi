@@ -13,9 +13,13 @@ from hyuav.experiments.comparison.plan import Compare as Compare
 from hyuav.experiments.comparison.work import compare as compare
 from hyuav.experiments.evaluation import EvaluationParameters as EvaluationParameters
 from hyuav.experiments.evaluation import evaluate as evaluate
+from hyuav.experiments.fly import fly as fly
 from hyuav.experiments.run import Run as Run
 from hyuav.experiments.run import load as load
 from hyuav.learning.ddpg import DDPG as DDPG
+from hyuav.learning.generalist.policy import GeneralistPolicy as GeneralistPolicy
+from hyuav.learning.generalist.pretrained import Generalist as Generalist
+from hyuav.learning.generalist.pretrained import pretrained as pretrained
 from hyuav.learning.guide.parameters import Guide as Guide
 from hyuav.learning.guide.robust import RobustDDPG as RobustDDPG
 from hyuav.learning.guide.robust import RobustSAC as RobustSAC
@@ -37,6 +41,7 @@ from hyuav.physics.layout import disk as disk
 from hyuav.physics.layout import random_layout as random_layout
 from hyuav.physics.scenario import PRESETS as PRESETS
 from hyuav.physics.scenario import Scenario as Scenario
+from hyuav.physics.scenario_families import family as family
 from hyuav.physics.slot import slot as slot
 from hyuav.references.flight import FlightPolicy as FlightPolicy
 from hyuav.references.optimum import solve_optimum as solve_optimum

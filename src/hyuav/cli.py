@@ -10,7 +10,10 @@ from types import ModuleType
 import hyuav
 from hyuav._support.errors import InputError, rejection, require_choice
 
-RECIPES = ("train", "evaluate", "reproduce", "compare", "regimes", "draw", "report", "dashboard")
+RECIPES = (
+    *("train", "evaluate", "reproduce", "compare", "regimes", "fly", "families", "generalist"),
+    *("draw", "report", "dashboard"),
+)
 """The commands that are recipes, in the order of the help."""
 
 BENCHMARK = "benchmark", "Measure how fast it is beside its peers, in the repository."

@@ -14,6 +14,7 @@ class Kind(Enum):
 
     LEARNED = "learned"
     LEARNED_AS_IN_PAPER = "learned by the paper's own algorithm, where another one is beside it"
+    GENERALIST = "one policy for every layout, trained beforehand"
     STRAIGHT = "a straight line"
     NO_HELPER = "nobody flies"
     OPTIMUM = "the exact optimum"
@@ -68,6 +69,9 @@ SCHEMES = {
         Scheme("re_ot", "Re-OT", "relay", Kind.LEARNED),
         Scheme("re_ot_paper", "Paper Re-OT", "relay", Kind.LEARNED_AS_IN_PAPER),
         Scheme(PROPOSED_POWER, "Proposed, power", "hybrid", Kind.LEARNED, _POWER),
+        Scheme("generalist", "Generalist", "hybrid", Kind.GENERALIST),
+        Scheme("ja_generalist", "Ja-generalist", "jamming", Kind.GENERALIST),
+        Scheme("re_generalist", "Re-generalist", "relay", Kind.GENERALIST),
         Scheme("re_lt", "Re-LT", "relay", Kind.STRAIGHT),
         Scheme("ja_lt", "Ja-LT", "jamming", Kind.STRAIGHT),
         Scheme(NO_HELPER, "No helper", "jamming", Kind.NO_HELPER, {"jamming_power": 0.0}),
@@ -96,6 +100,9 @@ LEARNED_AS_IN_PAPER = _by_mode_rule(Kind.LEARNED_AS_IN_PAPER)
 
 LEARNED_WITH_POWER = {"hybrid": PROPOSED_POWER}
 """The same where the helper's power is controlled, and is not in the scenario beside it."""
+
+GENERALISTS = _by_mode_rule(Kind.GENERALIST)
+"""The generalist under each mode rule."""
 
 OPTIMA = _by_mode_rule(Kind.OPTIMUM)
 """The optimum of each mode rule."""

@@ -20,7 +20,7 @@ from hyuav.envs.reward import Reward, Source
 from hyuav.envs.rewards import DEFAULT, SUM_RATE, as_reward
 from hyuav.envs.transforms import make_env
 from hyuav.learning.algorithm import Algorithm, AlgorithmParameters, made_on
-from hyuav.learning.export import export
+from hyuav.learning.export import Signature, export
 from hyuav.learning.weights import load_weights, select_learners
 from hyuav.physics.modes import fixed_modes
 from hyuav.physics.scenario import Scenario, as_scenario
@@ -206,7 +206,9 @@ class Policy(TensorDictModuleBase):
         """
         shape = (*self._rows, 2, self._layout.size)
         example = torch.zeros(shape, dtype=torch.float32, device="cpu")
-        export(self.network, path, example, self.environment)
+        free = {"observation": {len(shape) - 2: "batch"}}
+        signature = Signature({"observation": example}, free, "action")
+        export(self.network, path, signature, self.environment)
 
     @property
     def _rows(self) -> tuple[int, ...]:

@@ -40,6 +40,12 @@ def draw_weights(module: nn.Module, seeds: Sequence[int], stream: str) -> None:
             # Alike on every device.
             drawn = torch.empty(own.shape, dtype=own.dtype, device=generator.device)
             own.copy_(drawn.uniform_(-bound, bound, generator=generator))
+    begin_targets(module)
+
+
+def begin_targets(module: nn.Module) -> None:
+    """Let the target networks begin as copies of the networks."""
+    networks = dict(module.named_parameters())
     for name, target in module.named_buffers():
         if name.startswith("target_"):
             target.copy_(networks[name.removeprefix("target_")].data)

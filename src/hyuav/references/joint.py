@@ -36,7 +36,7 @@ COARSE_LEVELS = 15.0
 """Step in dB between the levels of power that are tried there."""
 
 WINDOW = 10.0
-"""How far in m a slot's place moves at most in one improvement."""
+"""By default, how far in m a slot's place moves at most in one improvement."""
 
 TURNS = 60
 """Improvements at most, each of one helper's flight."""
@@ -54,13 +54,21 @@ class SeveralHelpers:
         power_step: between the levels of power in dB.
         draws: of a slot's fading and tasks that the expected reward is averaged over.
         seed: of the draws.
+        window: how far in m a slot's place moves at most in one improvement.
     """
 
     def __init__(
-        self, physics: Physics, resolution: float, power_step: float, draws: int, seed: int
+        self,
+        physics: Physics,
+        resolution: float,
+        power_step: float,
+        draws: int,
+        seed: int,
+        window: float = WINDOW,
     ) -> None:
         generator = torch.Generator().manual_seed(seed)
         self._physics, self._resolution, self._step = physics, resolution, power_step
+        self._window = window
         self._expected = ExpectedReward(physics, draws, generator)
         self._quiet = ExpectedReward(physics, 1, generator)
         helpers = range(physics.scenario.num_helpers)
@@ -74,6 +82,10 @@ class SeveralHelpers:
         ]
         best = max(plans, key=lambda plan: self._earned(self._quiet, mode_rule, plan))
         return self._improved(self._expected, mode_rule, best)
+
+    def improved(self, mode_rule: str, plan: Plan, turns: int) -> Plan:
+        """A flight on the helpers' grids, improved without fading in so many turns at most."""
+        return self._improved(self._quiet, mode_rule, plan, turns)
 
     def _earned(self, expected: ExpectedReward, mode_rule: str, plan: Plan) -> float:
         return float(expected([mode_rule], plan[0][1:], plan[1]).sum())
@@ -135,11 +147,13 @@ class SeveralHelpers:
         shape = *grids[0].shape, *grids[1].shape
         return best.reshape(shape).numpy(), power.reshape(*shape, 2)
 
-    def _improved(self, expected: ExpectedReward, mode_rule: str, plan: Plan) -> Plan:
+    def _improved(
+        self, expected: ExpectedReward, mode_rule: str, plan: Plan, turns: int = TURNS
+    ) -> Plan:
         """Flights improved in turn until none improves."""
         reaches = reaches_of(self._physics, mode_rule, self._resolution)
         value, unimproved = self._earned(expected, mode_rule, plan), 0
-        for turn in range(TURNS):
+        for turn in range(turns):
             helper = turn % len(reaches)
             own = self._best_of_one(expected, mode_rule, plan, helper, reaches[helper])
             found = self._earned(expected, mode_rule, own)
@@ -158,7 +172,7 @@ class SeveralHelpers:
         positions = grid.positions()
         rewards, levels = [], []
         for places, shares in zip(path[1:], power, strict=True):
-            near = ((positions - places[helper]).abs() <= WINDOW).all(dim=-1)
+            near = ((positions - places[helper]).abs() <= self._window).all(dim=-1)
             candidates = places.expand(int(near.sum()), -1, -1).clone()
             candidates[:, helper] = positions[near]
             others = shares.expand(len(candidates), -1)

@@ -51,7 +51,8 @@ def test_a_checkpoint_flies_beside_the_optimum_in_a_changed_scenario(trained_run
     checkpoint = checkpoint_of(RunIndex(trained_runs), "tiny", 0)
     louder = dataclasses.replace(SCENARIO, jamming_power=0.01, num_slots=12)
     schemes = flown(louder, "hybrid", checkpoint).summary["schemes"]
-    assert set(schemes) == {"optimum", "proposed", "no_helper"}
+    assert set(schemes) == {"optimum", "proposed", "generalist", "no_helper"}
+    assert schemes["generalist"]["fraction_of_optimum"] > 0.9
     assert schemes["proposed"]["fraction_of_optimum"] < 1.0
     before = flown(SCENARIO, "hybrid", checkpoint).summary["schemes"]
     assert schemes["optimum"]["secrecy_sum_rate"] != before["optimum"]["secrecy_sum_rate"]

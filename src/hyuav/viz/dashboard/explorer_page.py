@@ -10,7 +10,7 @@ from hyuav._support.errors import InputError
 from hyuav._support.formatting import percent
 from hyuav.experiments.evaluation import Evaluation
 from hyuav.experiments.scenarios import named_scenario
-from hyuav.experiments.schemes import LEARNED, NO_HELPER, OPTIMA
+from hyuav.experiments.schemes import GENERALISTS, LEARNED, NO_HELPER, OPTIMA
 from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import PRESETS, Scenario
 from hyuav.viz.dashboard import draft as drafts
@@ -228,9 +228,10 @@ def _is_refined(scenario: Scenario, rule: str) -> bool:
 def _tell(evaluation: Evaluation, rule: str) -> None:
     """What the flights bring on average, the optimum first."""
     schemes = evaluation.summary["schemes"]
-    shown = [name for name in (OPTIMA[rule], LEARNED[rule], NO_HELPER) if name in schemes]
+    wanted = OPTIMA[rule], GENERALISTS[rule], LEARNED[rule], NO_HELPER
+    shown = [name for name in wanted if name in schemes]
     best = schemes[OPTIMA[rule]]["secrecy_sum_rate"]["mean"]
-    for column, name in zip(st.columns(3), shown, strict=False):
+    for column, name in zip(st.columns(len(shown)), shown, strict=True):
         result = schemes[name]
         mean = result["secrecy_sum_rate"]["mean"]
         beside = name != OPTIMA[rule] and best > 0.0

@@ -15,7 +15,8 @@ from hyuav.experiments.policies import (
     straight_policies,
 )
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
-from hyuav.experiments.schemes import LABELS, LEARNED, NO_HELPER, OPTIMA
+from hyuav.experiments.schemes import GENERALISTS, LABELS, LEARNED, NO_HELPER, OPTIMA
+from hyuav.learning.generalist.pretrained import pretrained
 from hyuav.learning.learners import Learner
 from hyuav.learning.policy import Policy
 from hyuav.physics.scenario import Scenario
@@ -122,7 +123,7 @@ def optimum(scenario: Scenario, rule: str, *, fine: bool) -> Optimum:
 def flown(
     scenario: Scenario, rule: str, checkpoint: Checkpoint | None = None, *, fine: bool = False
 ) -> Evaluation:
-    """Fly the optimum and, beside it, no helper and a checkpoint through the same fading.
+    """Fly the optimum, the generalist, no helper and a checkpoint through the same fading.
 
     Args:
         scenario: to fly.
@@ -136,6 +137,7 @@ def flown(
     best = optimum(scenario, rule, fine=fine)
     policies: Policies = {
         OPTIMA[rule]: [best.policy],
+        GENERALISTS[rule]: [pretrained().policy(scenario, rule)],
         NO_HELPER: [no_helper(scenario)],
     }
     if checkpoint is not None:

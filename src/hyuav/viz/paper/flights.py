@@ -27,9 +27,9 @@ TRAJECTORIES = (*FLOWN_BY_LEARNING, "optimum")
 """What Fig. 3 shows."""
 
 FLIGHT_PANELS = {
-    "optimum": ["proposed"],
-    "re_optimum": ["re_ot", "re_lt"],
-    "ja_optimum": ["ja_ot", "ja_lt"],
+    "optimum": ["proposed", "generalist"],
+    "re_optimum": ["re_ot", "re_generalist", "re_lt"],
+    "ja_optimum": ["ja_ot", "ja_generalist", "ja_lt"],
     OPTIMUM_POWER: [PROPOSED_POWER],
 }
 """The maps of the flight figure: the optimum underneath, and the schemes flown over it.
@@ -90,7 +90,7 @@ def flight_map(scenario: Scenario, flights: pd.DataFrame) -> Figure:
             _draw_optimum(axes, flown, optimum)
             for scheme in schemes:
                 _draw_scheme(axes, flown, scheme)
-            axes.set_title(" and ".join(LABELS[scheme] for scheme in schemes))
+            axes.set_title(" and ".join(LABELS[scheme] for scheme in schemes if scheme in flown))
             axes.label_outer()
             if with_power:  # narrow panels, whose outermost labels would touch
                 quarter = scenario.map_side / 4

@@ -1,0 +1,73 @@
+"""Fly the generalist in a family of scenarios that it has never seen, beside the optimum of each.
+
+hyuav families family=one
+hyuav families family=two scenarios=50 output=runs/two
+"""
+
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
+
+from pathlib import Path
+
+import pandas as pd
+from rich.console import Console
+
+from hyuav._support.formatting import percent
+from hyuav._support.terminal import print_line, print_table, results_table
+from hyuav.experiments.command_line import same_call
+from hyuav.experiments.configuration import Config, recipe, section, telling_how_to_go_on
+from hyuav.experiments.families import (
+    TABLE_FILE,
+    Families,
+    FamiliesDirectory,
+    distribution,
+    fractions,
+)
+
+BY = (None, "power_control", "mode_rule", "num_helpers", "num_ues", "num_slots")
+"""What the fractions are told by, after all of them together."""
+
+WORST = 5
+"""Scenarios that are named."""
+
+
+@recipe("families", Families, groups={}, sections={}, run_directory="${output}")
+def main(config: Config, directory: Path) -> None:
+    """Fly what is left, and print how the fractions are distributed."""
+    options, console = section(config, Families), Console()
+    with telling_how_to_go_on(*same_call("output", directory)):
+        table = FamiliesDirectory(directory, config, options).complete(console)
+    own = fractions(table)
+    title = (
+        f"family {options.family}, {len(own)} scenarios, % of the optimum "
+        f"({len(table) - len(own)} left out, where it brings next to nothing)"
+    )
+    columns = ("refined\nmean", "5th per-\ncentile", "worst")
+    shown = results_table(title, "", "scena-\nrios", "mean", "5th per-\ncentile", "worst", *columns)
+    for by in BY:
+        for _, row in distribution(own, by).iterrows():
+            cells = (
+                percent(row[f"{name}_{what}"], 2 if what == "mean" else 1).rstrip(" %")
+                for name in ("generalist", "refined")
+                for what in ("mean", "p5", "worst")
+            )
+            shown.add_row(f"{row['of']} {row['value']}".strip(), str(row["scenarios"]), *cells)
+    print_table(shown, console)
+    tell_worst(own, console)
+    print_line(f"all scenarios: {directory / TABLE_FILE}", console)
+
+
+def tell_worst(own: pd.DataFrame, console: Console) -> None:
+    """Name the scenarios in which the generalist loses most."""
+    worst = own.nsmallest(WORST, "generalist_fraction")
+    told = ", ".join(
+        f"{int(row['seed'])} ({percent(row['generalist_fraction'])})" for _, row in worst.iterrows()
+    )
+    print_line(f"worst seeds: {told}", console)
+    seconds = own["seconds"].median(), own["seconds_refining"].median()
+    print_line(f"seconds per flight, median: {seconds[0]:.2f}, to refine {seconds[1]:.2f}", console)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""Train one policy for every layout, from scenarios that dynamic programming solves.
+
+hyuav generalist output=runs/generalist
+hyuav generalist scenarios=600 generalist.steps=2000
+"""
+
+import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
+
+# isort: split
+
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+from hyuav._support.formatting import percent
+from hyuav._support.terminal import print_line
+from hyuav.experiments.command_line import same_call
+from hyuav.experiments.configuration import Config, recipe, section, telling_how_to_go_on
+from hyuav.experiments.generalist import (
+    PROGRESS_FILE,
+    WEIGHTS_FILE,
+    GeneralistDirectory,
+    TrainGeneralist,
+)
+from hyuav.learning.generalist.training import GeneralistParameters
+
+
+@recipe(
+    "generalist",
+    TrainGeneralist,
+    groups={},
+    sections={"learning": GeneralistParameters},
+    run_directory="${output}",
+)
+def main(config: Config, directory: Path) -> None:
+    """Do what is left of the training; told to stop, say how to go on."""
+    options, console = section(config, TrainGeneralist), Console()
+    torch.set_num_threads(options.threads)
+    parameters = GeneralistParameters.from_dict(config["learning"])
+    with telling_how_to_go_on(*same_call("output", directory)):
+        training = GeneralistDirectory(directory, config, options, parameters)
+        last = training.learn(console)
+    print_line(
+        f"of the optimum in scenarios for validation: {percent(last.mean, 2)} in the mean, "
+        f"{percent(last.fifth_percentile, 2)} at the 5th percentile, {percent(last.worst)} worst",
+        console,
+    )
+    print_line(f"weights: {directory / WEIGHTS_FILE}, progress: {PROGRESS_FILE}", console)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,204 @@
+"""How the generalist flies in whole families of scenarios, beside the optimum of each."""
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any
+
+import pandas as pd
+import torch
+from pydantic import Field
+from pydantic.dataclasses import dataclass as pydantic_dataclass
+from rich.console import Console
+
+from hyuav._support.errors import Halted, ScenarioWarning
+from hyuav._support.files import write_durably
+from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    OneOf,
+    Parameters,
+    PositiveNumber,
+    Text,
+    parameter,
+)
+from hyuav._support.terminal import make_progress
+from hyuav.experiments.comparison.processes import Workers
+from hyuav.experiments.evaluation import EvaluationParameters, fly
+from hyuav.experiments.requests import keep_request
+from hyuav.experiments.schemes import GENERALISTS
+from hyuav.learning.generalist.pretrained import pretrained
+from hyuav.learning.generalist.refine import refined
+from hyuav.physics.scenario_families import FAMILIES, SPLITS, family
+from hyuav.references.flight import FlightPolicy
+from hyuav.references.optimum import solve_optimum
+
+CHUNK = 5
+"""Scenarios that are flown together, in one file."""
+
+LEAST = 1.0
+"""bps/Hz that the optimum must bring, or a scenario is left out."""
+
+POWER_STEP = 1.0
+"""In dB, between the levels of power that the optimum chooses from."""
+
+DRAWS = 16
+"""Of fading, over which the optimum's expected reward is averaged."""
+
+WORKING = ("output", "workers", "retries")
+"""What changes how the work is done and not what comes of it."""
+
+TABLE_FILE = "families.csv"
+
+
+@pydantic_dataclass(frozen=True)
+class Families(Parameters):
+    """Which scenarios are flown, and how exactly."""
+
+    family: Annotated[str, OneOf(*FAMILIES)] = parameter("one")
+    split: Annotated[str, OneOf(*SPLITS)] = parameter("test")
+    scenarios: Count = parameter(300)
+    first: CountOrZero = parameter(0)
+    """The seed of the first scenario."""
+    episodes: Annotated[int, Field(ge=2, le=10**6)] = parameter(100)
+    """Of fading, the same for all that fly a scenario."""
+    resolution: PositiveNumber = parameter(2.0, unit="m")
+    """Of the optimum's grid."""
+    workers: Count = parameter(2)
+    retries: CountOrZero = parameter(2)
+    output: Text = parameter("runs/families")
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Some scenarios of a family, flown once and kept in a file."""
+
+    seeds: range
+    options: Families
+    file: Path
+
+    def fly(self) -> None:
+        """Fly each scenario and write the file."""
+        torch.set_num_threads(1)
+        warnings.simplefilter("ignore", ScenarioWarning)  # some bring nothing, and are counted
+        rows = [flown(seed, self.options) for seed in self.seeds]
+        write_durably(self.file, pd.DataFrame(rows).to_parquet())
+
+
+def flown(seed: int, options: Families) -> dict[str, Any]:
+    """What the generalist, refined too, and the optimum earn in a scenario, as a row."""
+    scenario, rule = family(options.family, seed, options.split)
+    parameters = EvaluationParameters(episodes=options.episodes, flights=1, seed=seed)
+    begun = perf_counter()
+    policy = pretrained("generalist").policy(scenario, rule)
+    plan = policy.plan()
+    planned = perf_counter()
+    better = refined(policy)
+    seconds = planned - begun, perf_counter() - planned
+    best = solve_optimum(
+        scenario,
+        [rule],
+        resolution=options.resolution,
+        power_step=POWER_STEP,
+        draws=DRAWS,
+        evaluation_draws=2,
+        certify=False,
+    )[rule]
+    policies = {
+        "generalist": FlightPolicy(plan.path, scenario, plan.share),
+        "refined": better,
+        "optimum": best.policy,
+    }
+    earned = {
+        name: float(fly(scenario, GENERALISTS[rule], own, parameters).earned.mean())
+        for name, own in policies.items()
+    }
+    return {
+        "family": options.family,
+        "seed": seed,
+        "mode_rule": rule,
+        "num_ues": scenario.num_ues,
+        "num_slots": scenario.num_slots,
+        "power_control": scenario.power_control,
+        "num_helpers": scenario.num_helpers,
+        **earned,
+        "seconds": seconds[0],
+        "seconds_refining": seconds[1],
+    }
+
+
+class FamiliesDirectory:
+    """The files of one evaluation: ``flown/`` and, of all scenarios, ``families.csv``.
+
+    Args:
+        path: of the directory, which may hold part of the same evaluation.
+        request: all that was asked for.
+        options: which scenarios are flown.
+
+    Raises:
+        InputError: another evaluation is in the directory, or it cannot be written to.
+    """
+
+    def __init__(self, path: Path, request: dict[str, object], options: Families) -> None:
+        keep_request(path, request, WORKING, "an evaluation of a family")
+        self.path, self._options = path, options
+        (path / "flown").mkdir(exist_ok=True)
+
+    def complete(self, console: Console) -> pd.DataFrame:
+        """Fly what is not flown yet; a row for each scenario."""
+        options = self._options
+        last = options.first + options.scenarios
+        chunks = [
+            Chunk(
+                range(first, min(first + CHUNK, last)),
+                options,
+                self.path / "flown" / f"{first:06}.parquet",
+            )
+            for first in range(options.first, last, CHUNK)
+        ]
+        left = [chunk for chunk in chunks if not chunk.file.exists()]
+        progress = make_progress(console, f"scenarios, in {CHUNK}s")
+        with progress, Workers(options.workers, options.retries) as workers:
+            task = progress.add_task("", total=len(chunks), completed=len(chunks) - len(left))
+            for _, reason in workers.attempt_all(Chunk.fly, left):
+                if reason is not None:
+                    raise Halted(f"failed: {reason}; what is flown is kept")
+                progress.advance(task)
+        table = pd.concat([pd.read_parquet(chunk.file) for chunk in chunks], ignore_index=True)
+        write_durably(self.path / TABLE_FILE, table.to_csv(index=False).encode())
+        return table
+
+
+def fractions(table: pd.DataFrame) -> pd.DataFrame:
+    """The scenarios in which there is something to earn, with fractions of the optimum."""
+    own = table[table["optimum"] >= LEAST].copy()
+    for name in ("generalist", "refined"):
+        own[f"{name}_fraction"] = own[name] / own["optimum"]
+    return own
+
+
+def distribution(own: pd.DataFrame, by: str | None = None) -> pd.DataFrame:
+    """Mean, 5th percentile and worst of the fractions, of all or by a column.
+
+    Args:
+        own: what :func:`fractions` gives.
+        by: a column; numbers of users and slots are put into bins.
+    """
+    if by is None:
+        groups = [("all", own)]
+    else:
+        keys = pd.cut(own[by], 4, precision=0) if own[by].nunique() > 6 else own[by]
+        groups = [(str(key), part) for key, part in own.groupby(keys, observed=True)]
+    rows = []
+    for key, part in groups:
+        row: dict[str, Any] = {"of": by or "", "value": key, "scenarios": len(part)}
+        for name in ("generalist", "refined"):
+            fraction = part[f"{name}_fraction"]
+            row |= {
+                f"{name}_mean": fraction.mean(),
+                f"{name}_p5": fraction.quantile(0.05),
+                f"{name}_worst": fraction.min(),
+            }
+        rows.append(row)
+    return pd.DataFrame(rows)

@@ -1,0 +1,1 @@
+"""A policy for every layout, trained once across scenarios."""

@@ -1,0 +1,213 @@
+"""What is known of a scenario before a helper flies, as the generalist sees it: maps and nodes.
+
+The physics is known, so a map tells what one slot brings with the helper at each place of a
+lattice. Views are cut out of it around the helper, fine nearby and coarse far away: they cover the
+whole map and have the same size in every scenario. The nodes themselves are a set of tokens.
+"""
+
+import dataclasses
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import Tensor
+
+from hyuav.learning.generalist.destinations import destinations
+from hyuav.physics.scenario import Scenario
+from hyuav.physics.slot import Physics
+from hyuav.references.grid import grid_over_map, reaches_of
+from hyuav.references.power import best_levels
+from hyuav.references.rewards import ExpectedReward
+
+STEPS = 10
+"""Spacings of the lattice that a helper flies along each axis in a slot, at its fastest."""
+
+MOST_SPACINGS = 400
+"""Along one side of the map: a slower helper flies fewer of them in a slot."""
+
+REACH = 2 * STEPS + 1
+"""Places within reach along each axis."""
+
+VIEWS = ((2, 21), (6, 11), (12, 17))
+"""The spacing of each view's places, in those of the lattice, and how many there are per side."""
+
+VIEW_SIZE = sum(count**2 for _, count in VIEWS)
+
+POWER_STEP = 5.0
+"""Between the levels of power that are tried at each place, in dB."""
+
+EDGE = 1e-4
+"""In m, what is taken off the radius of coverage."""
+
+OUTSIDE = -1.0
+"""What a map tells beyond the edge of the world; rewards are from 0 to 1."""
+
+TURNS = tuple(
+    torch.tensor(turn)
+    for turn in (
+        *([[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]),
+        *([[-1, 0], [0, 1]], [[1, 0], [0, -1]], [[0, 1], [1, 0]], [[0, -1], [-1, 0]]),
+    )
+)
+"""The symmetries of the map: four turns, and the same behind a mirror."""
+
+
+def offsets(spacing: int, count: int, device: torch.device | str = "cpu") -> Tensor:
+    """A square of places around a helper, in spacings of the lattice: (count^2, 2)."""
+    axis = (torch.arange(count, device=device) - count // 2) * spacing
+    return torch.cartesian_prod(axis, axis)
+
+
+CANDIDATES = offsets(1, REACH)
+"""Where a helper may be in the next slot, from where it is: (REACH^2, 2) spacings."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scenes:
+    """What is known of helpers' worlds, with an axis of scenes in front; all maps are square."""
+
+    rewards: Tensor
+    """What a slot brings at each place, 1 at the best one, :data:`OUTSIDE` off the map: one row of
+    side^2 places and one for all that lies outside."""
+    views: Tensor
+    """The best nearby: the same for each of :data:`VIEWS`, (len(VIEWS), side^2 + 1)."""
+    shares: Tensor
+    """The power that brings it, in units of the nominal one: (side^2 + 1,)."""
+    reachable: Tensor
+    """(REACH^2,) bool: which of :data:`CANDIDATES` one slot of flight reaches."""
+    best: Tensor
+    """(1,) bps/Hz: what 1 stands for."""
+    corner: Tensor
+    """(2,) m: the first place of the lattice."""
+    spacing: Tensor
+    """(1,) m, of the lattice."""
+    start: Tensor
+    """(2,) int64: row and column where the helper starts."""
+    num_slots: Tensor
+    """(1,) int64: T."""
+
+    @classmethod
+    def joined(cls, several: Iterable[Self]) -> Self:
+        """All scenes in a row; their maps are of one size."""
+        columns = zip(*(own.entries().values() for own in several), strict=True)
+        return cls(*(torch.cat(parts) for parts in columns))
+
+    def entries(self) -> dict[str, Tensor]:
+        """All of them, by name."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+    def to(self, device: torch.device | str) -> Self:
+        """The same on a device."""
+        return type(self)(*(values.to(device) for values in self.entries().values()))
+
+    @property
+    def count(self) -> int:
+        """S, how many scenes there are."""
+        return len(self.start)
+
+    @property
+    def side(self) -> int:
+        """Places along one side of the maps."""
+        return round((self.rewards.shape[-1] - 1) ** 0.5)
+
+    def around(
+        self, maps: Tensor, scene: Tensor, place: Tensor, at: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """What maps tell of places around helpers.
+
+        Args:
+            maps: (S, side^2 + 1), a row for each scene.
+            scene: (B,) int64, of each helper.
+            place: (B, 2) int64, row and column of each helper.
+            at: (K, 2), such as :data:`CANDIDATES`.
+
+        Returns:
+            (B, K), and where in the row it stands, (B, K) int64.
+        """
+        side = self.side
+        row, column = (place.unsqueeze(-2) + at).unbind(dim=-1)
+        inside = (row >= 0) & (row < side) & (column >= 0) & (column < side)
+        index = torch.where(inside, row * side + column, side**2)
+        return maps[scene.unsqueeze(-1), index], index
+
+
+def scenes_of(scenario: Scenario, mode_rule: str) -> Scenes:
+    """What is known of a scenario under a mode rule: a scene for each helper.
+
+    Where there are several, each sees what a slot brings with the others where they are best, as
+    :func:`hyuav.learning.generalist.destinations.destinations` has it. Fading is left out: it
+    hardly changes which flight is best.
+    """
+    physics = Physics(_within_coverage(scenario), dtype=torch.float32)
+    quiet = ExpectedReward(physics, 1, torch.Generator())
+    others = destinations(physics, quiet, mode_rule)
+    scenes = [
+        _scene_of_one(physics, quiet, mode_rule, helper, others)
+        for helper in range(scenario.num_helpers)
+    ]
+    return Scenes.joined(scenes)
+
+
+def _within_coverage(scenario: Scenario) -> Scenario:
+    """The same without the edge of coverage, which a flight in float32 may miss."""
+    radius = max(scenario.coverage_radius - EDGE, 0.0)
+    return dataclasses.replace(scenario, coverage_radius=radius)
+
+
+def _scene_of_one(
+    physics: Physics,
+    quiet: ExpectedReward,
+    mode_rule: str,
+    helper: int,
+    others: tuple[Tensor, Tensor],
+) -> Scenes:
+    scenario = physics.scenario
+    spacing = max(
+        scenario.max_speed * scenario.slot_duration / STEPS, scenario.map_side / MOST_SPACINGS
+    )
+    grid = grid_over_map(scenario, spacing, helper)
+    own = grid.positions().to(physics.dtype)
+    places, power = (each.expand(len(own), *each.shape).clone() for each in others)
+    places[:, helper] = own
+    rewards, shares = best_levels(quiet, quiet, [mode_rule], places, power, helper, POWER_STEP)
+    best = float(rewards.max())
+    side = int(scenario.map_side / spacing * (1 + 1e-9)) + 1
+    normalized = _square(rewards.reshape(grid.shape) / max(best, 1e-9), side, OUTSIDE)
+    near = [_best_nearby(normalized, step + 1 - step % 2) for step, _ in VIEWS]
+    return Scenes(
+        rewards=_with_outside(normalized, OUTSIDE).unsqueeze(0),
+        views=torch.stack([_with_outside(view, OUTSIDE) for view in near]).half().unsqueeze(0),
+        shares=_with_outside(_square(shares.reshape(grid.shape), side, 1.0), 1.0).unsqueeze(0),
+        reachable=_reachable(physics, mode_rule, spacing, helper).unsqueeze(0),
+        best=torch.tensor([[best]]),
+        corner=torch.tensor([[grid.x[0], grid.y[0]]], dtype=torch.float32),
+        spacing=torch.tensor([[spacing]]),
+        start=torch.tensor([grid.start]),
+        num_slots=torch.tensor([[scenario.num_slots]]),
+    )
+
+
+def _square(values: Tensor, side: int, beyond: float) -> Tensor:
+    rows, columns = values.shape
+    return F.pad(values, (0, side - columns, 0, side - rows), value=beyond)
+
+
+def _with_outside(values: Tensor, outside: float) -> Tensor:
+    return F.pad(values.flatten(), (0, 1), value=outside)
+
+
+def _best_nearby(values: Tensor, width: int) -> Tensor:
+    """The best within a square of an odd width around each place, (side, side)."""
+    padded = F.pad(values[None, None], (width // 2,) * 4, value=OUTSIDE)
+    return F.max_pool2d(padded, width, stride=1)[0, 0]
+
+
+def _reachable(physics: Physics, mode_rule: str, spacing: float, helper: int) -> Tensor:
+    moves = reaches_of(physics, mode_rule, spacing)[helper].displacements
+    moves = moves[(np.abs(moves) <= STEPS).all(axis=1)] + STEPS
+    reachable = torch.zeros(REACH, REACH, dtype=torch.bool)
+    reachable[moves[:, 0], moves[:, 1]] = True
+    return reachable.flatten()

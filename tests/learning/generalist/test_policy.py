@@ -1,0 +1,77 @@
+"""The generalist flies what it plans, in environments of one helper and of several."""
+
+import dataclasses
+
+import pytest
+import torch
+
+from hyuav import Scenario, family, make_env, pretrained
+from hyuav.learning.generalist.policy import GeneralistPolicy
+from hyuav.learning.generalist.refine import refined
+from hyuav.physics.slot import Physics
+from hyuav.references.rewards import estimate_return
+
+SHORT = {"num_slots": 6, "fading": False}
+
+
+def short(name: str, seed: int) -> Scenario:
+    return dataclasses.replace(family(name, seed).scenario, **SHORT)
+
+
+def policy_of(scenario: Scenario, mode_rule: str = "hybrid") -> GeneralistPolicy:
+    return pretrained("generalist").policy(scenario, mode_rule)
+
+
+CASES = {
+    "one": short("one", 1),
+    "power": dataclasses.replace(short("one", 2), power_control=True),
+    "disc": dataclasses.replace(short("one", 3), speed_limit="disc"),
+    "two": dataclasses.replace(short("two", 1), power_control=False),
+    "two, power": dataclasses.replace(short("two", 2), power_control=True),
+}
+
+
+@pytest.mark.parametrize("scenario", CASES.values(), ids=CASES)
+def test_what_is_planned_is_flown_and_earned(scenario: Scenario) -> None:
+    policy = policy_of(scenario)
+    plan = policy.plan()
+    flown = make_env(scenario, batch_size=(3,), seed=0).rollout(scenario.num_slots, policy)
+    torch.testing.assert_close(
+        flown["next", "position"], plan.path[1:].float().expand(3, -1, -1, -1), atol=1e-3, rtol=0.0
+    )
+    assert not flown["next", "off_map"].any()
+    physics = Physics(scenario, dtype=torch.float64)
+    generator = torch.Generator()
+    told = estimate_return(physics, plan.path, "hybrid", 1, generator, plan.share)[0]
+    earned = flown["next", "reward"].sum(dim=-2)
+    torch.testing.assert_close(earned, torch.full_like(earned, told), rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["one", "power", "two"])
+def test_refined_flights_bring_no_less(name: str) -> None:
+    scenario = CASES[name]
+    physics, policy = Physics(scenario, dtype=torch.float64), policy_of(scenario)
+    before, better = policy.plan(), refined(policy)
+    env = make_env(scenario, batch_size=(1,), seed=0)
+    flown = env.rollout(scenario.num_slots, better)["next", "reward"].sum()
+    told = estimate_return(physics, before.path, "hybrid", 1, torch.Generator(), before.share)[0]
+    assert float(flown) >= told * (1 - 1e-5)
+
+
+def test_rows_elsewhere_are_flown_from_where_they_are() -> None:
+    scenario = CASES["one"]
+    policy = policy_of(scenario)
+    env = make_env(scenario, batch_size=(2,), seed=0)
+    state = env.reset()
+    state["position"] = torch.tensor([[[0.0, 0.0]], [[90.0, -90.0]]])
+    acted = policy(state)["action"]
+    assert acted.abs().max() <= 1.0
+    assert not torch.equal(acted[0], acted[1])
+
+
+def test_where_nothing_can_be_earned_it_flies_all_the_same() -> None:
+    scenario = dataclasses.replace(CASES["one"], coverage_radius=1.0)
+    with pytest.warns(UserWarning, match="nothing can be earned"):
+        path, share = policy_of(scenario).plan()
+    assert path.isfinite().all()
+    assert share.isfinite().all()
