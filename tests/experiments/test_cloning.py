@@ -6,6 +6,7 @@ import pytest
 
 from hyuav.experiments import cloning
 from hyuav.experiments.cloning import cloned_weights
+from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.sac import SAC
 from hyuav.learning.training import Training
 from sample_runs import ONE_OF_EACH
@@ -13,7 +14,7 @@ from sample_runs import ONE_OF_EACH
 
 @pytest.mark.parametrize("algorithm", [ONE_OF_EACH.algorithm, SAC(hidden_sizes=(64,))])
 def test_clones_earn_more_than_what_begins_fresh(
-    algorithm: object, monkeypatch: pytest.MonkeyPatch
+    algorithm: AlgorithmParameters, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cloning, "STEPS", 300)
     configuration = dataclasses.replace(

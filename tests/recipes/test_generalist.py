@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from hyuav.experiments import generalist
+from hyuav.learning.checkpoint import save_checkpoint
 from recipe_calls import Call, Refusal
 
 Printed = pytest.CaptureFixture[str]
@@ -28,10 +29,10 @@ def test_it_is_trained_kept_and_continued(
     with np.load(here / "generalist.npz", allow_pickle=False) as arrays:
         whole = {name: arrays[name] for name in arrays.files}
     # The same, interrupted after the first evaluation.
-    save, kept = generalist.save_checkpoint, []
+    kept: list[Path] = []
 
     def save_once(path: Path, kind: str, content: dict[str, object]) -> None:
-        save(path, kind, content)
+        save_checkpoint(path, kind, content)
         if kind == "generalist":
             kept.append(path)
             if len(kept) == 1:

@@ -64,7 +64,8 @@ def _flown(configuration: RunConfiguration, learner: Learner) -> TensorDict:
         learner.scheme,
         batch_size=(FLIGHTS,),
         seed=learner.seed,
-        **configuration.algorithm.environment,
+        clock=configuration.algorithm.clock,
+        geofence=configuration.algorithm.geofence,
     )
     generator = torch.Generator().manual_seed(learner.seed)
     state, kept = env.reset(), []

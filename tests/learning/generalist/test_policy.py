@@ -11,11 +11,9 @@ from hyuav.learning.generalist.refine import refined
 from hyuav.physics.slot import Physics
 from hyuav.references.rewards import estimate_return
 
-SHORT = {"num_slots": 6, "fading": False}
-
 
 def short(name: str, seed: int) -> Scenario:
-    return dataclasses.replace(family(name, seed).scenario, **SHORT)
+    return dataclasses.replace(family(name, seed).scenario, num_slots=6, fading=False)
 
 
 def policy_of(scenario: Scenario, mode_rule: str = "hybrid") -> GeneralistPolicy:

@@ -51,13 +51,14 @@ def test_each_horizon_has_its_optima_and_the_scenarios_own_comes_first(
     assert names == ["Accumulated reward (bps/Hz), T = 12", "Accumulated reward (bps/Hz), T = 8"]
     assert next(iter(picture.figures)) == names[0]
     best = shorter.summary["schemes"]
-    drawn = {shape.y0 for shape in picture.figures[names[1]].layout.shapes}
+    drawings: list[Any] = [picture.figures[name] for name in names]
+    drawn = {shape.y0 for shape in drawings[1].layout.shapes}
     assert drawn == {best[name]["secrecy_sum_rate"]["mean"] for name in ("optimum", "re_optimum")}
-    own = {shape.y0 for shape in picture.figures[names[0]].layout.shapes}
+    own = {shape.y0 for shape in drawings[0].layout.shapes}
     assert len(own) == 2
     assert min(own) > min(drawn)
     alone = best["no_helper"]["secrecy_sum_rate"]["mean"]
-    named = {trace.name for trace in picture.figures[names[1]].data}
+    named = {trace.name for trace in drawings[1].data}
     assert f"No helper: {alone:.4g}" in named
 
 
