@@ -14,7 +14,7 @@ import hyuav
 from hyuav import cli
 from hyuav.experiments.metrics import readable_metrics
 from hyuav.experiments.run_directory import RunDirectory
-from recipe_calls import TINY, TINY_COMPARISON
+from recipe_calls import TINY, TINY_COMPARISON, Refusal
 
 RECIPES = Path(__file__).parents[1] / "recipes"
 
@@ -126,12 +126,10 @@ def test_without_the_repository_the_benchmark_says_how_to_get_it(
     assert line.count("\n") == 1
 
 
-def test_a_mistake_is_told_as_the_recipe_tells_it(command: str) -> None:
+def test_a_mistake_is_told_as_the_recipe_tells_it(command: str, refusal: Refusal) -> None:
     by_command = run(command, "train", "algorithm=ppo")
-    by_recipe = run(sys.executable, str(RECIPES / "train.py"), "algorithm=ppo")
-    assert by_command.returncode == by_recipe.returncode == 2
-    assert by_command.stderr == by_recipe.stderr
-    assert by_command.stderr.count("\n") == 1
+    assert by_command.returncode == 2
+    assert by_command.stderr == refusal("train", "algorithm=ppo")
 
 
 def test_words_that_are_no_options_are_answered_in_one_line(command: str) -> None:

@@ -57,7 +57,7 @@ def cohort(
     return Cohort(
         scenario,
         LEARNERS,
-        ALGORITHMS[name](hidden_sizes=(12,), **short),
+        ALGORITHMS[name](hidden_sizes=(12, 8), **short),
         device=None,
         reward=as_reward(reward),
         **(SMALL | changes),
@@ -146,7 +146,7 @@ def trained(learners: list[Learner], **changes: Any) -> Training:
     return Training(
         SCENARIO,
         learners,
-        ALGORITHMS["ddpg"](hidden_sizes=(12,)),
+        ALGORITHMS["ddpg"](hidden_sizes=(12, 8)),
         dataclasses.replace(parameters, **changes),
     )
 

@@ -14,7 +14,7 @@ from hyuav import Scenario, clusters
 from hyuav.experiments.run_directory import RunDirectory
 from hyuav.experiments.schemes import LABELS
 from hyuav.learning.ddpg import DDPG
-from recipe_calls import FEW, SHORT, TINY, Call, Refusal
+from recipe_calls import FEW, SHORT, Call, Refusal
 
 NAMES = "ddpg, ddpg_robust, maddpg, sac, sac_robust, td3, td3_robust"
 RECIPES = Path(__file__).parents[2] / "recipes"
@@ -116,7 +116,7 @@ def test_runs_that_cannot_be_evaluated_leave_nothing_behind(
 def test_a_training_goes_on_as_it_was_configured(
     call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    call("train", *TINY, "learners=2", "hydra.run.dir=begun")
+    call("train", *SHORT, "learners=2", "hydra.run.dir=begun")
     metrics = (tmp_path / "begun" / "metrics.csv").read_bytes()
     capsys.readouterr()
     call("train", "resume=begun", "logger.name=later")  # which has nothing left to do
@@ -128,7 +128,7 @@ def test_a_training_goes_on_as_it_was_configured(
 def test_the_same_call_goes_on_and_says_so(
     call: Call, refusal: Refusal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shorter, whole = ("train", "hydra.run.dir=run", *TINY), tmp_path / "whole" / "metrics.csv"
+    shorter, whole = ("train", "hydra.run.dir=run", *SHORT), tmp_path / "whole" / "metrics.csv"
     longer = (*shorter, "training.num_episodes=6")
     call(*longer, "hydra.run.dir=whole")
     call(*shorter)

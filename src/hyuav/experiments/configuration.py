@@ -128,8 +128,8 @@ def recipe(
             with _ending_in_one_line(vocabulary, lambda: composed):
                 loaded()  # from here on an interruption is answered
                 remember()
-                own = run_named(chosen="algorithm" in groups)
-                register(groups)
+                if own := run_named(chosen="algorithm" in groups):
+                    register(groups)
                 read_files_as_data(groups, _completed)
                 vocabulary().refuse(sys.argv[1:])
                 hydra.main(version_base=None, config_path=None, config_name=name)(run)()
