@@ -24,6 +24,11 @@ from hyuav.experiments.families import (
     distribution,
     fractions,
 )
+from hyuav.experiments.fly import fly
+from hyuav.physics.scenario_families import family
+from hyuav.viz.paper.families import families_figure
+from hyuav.viz.paper.flights import save_flight_map
+from hyuav.viz.paper.style import save_figure
 
 BY = (None, "power_control", "mode_rule", "num_helpers", "num_ues", "num_slots")
 """What the fractions are told by, after all of them together."""
@@ -55,6 +60,11 @@ def main(config: Config, directory: Path) -> None:
             shown.add_row(f"{row['of']} {row['value']}".strip(), str(row["scenarios"]), *cells)
     print_table(shown, console)
     tell_worst(own, console)
+    save_figure(families_figure(own), directory, "families")
+    for seed in own.nsmallest(options.drawn, "generalist_fraction")["seed"]:
+        scenario, _ = family(options.family, int(seed), options.split)
+        flown = fly(scenario, episodes=options.episodes, seed=int(seed))
+        save_flight_map(scenario, flown.flights, directory / "worst", f"seed_{seed}")
     print_line(f"all scenarios: {directory / TABLE_FILE}", console)
 
 

@@ -46,7 +46,7 @@ POWER_STEP = 1.0
 DRAWS = 16
 """Of fading, over which the optimum's expected reward is averaged."""
 
-WORKING = ("output", "workers", "retries")
+WORKING = ("output", "workers", "retries", "drawn")
 """What changes how the work is done and not what comes of it."""
 
 TABLE_FILE = "families.csv"
@@ -65,6 +65,8 @@ class Families(Parameters):
     """Of fading, the same for all that fly a scenario."""
     resolution: PositiveNumber = parameter(2.0, unit="m")
     """Of the optimum's grid."""
+    drawn: CountOrZero = parameter(3)
+    """Of the scenarios in which most is lost, how many flights are drawn."""
     workers: Count = parameter(2)
     retries: CountOrZero = parameter(2)
     output: Text = parameter("runs/families")
