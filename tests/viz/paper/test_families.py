@@ -39,5 +39,5 @@ def test_fractions_are_told_of_all_and_by_a_column() -> None:
 
 def test_the_figure_draws_every_scenario() -> None:
     left, right = families_figure(fractions(TABLE)).axes
-    assert [len(line.get_xdata()) for line in left.lines] == [2, 2, 3, 3]
-    assert sum(len(line.get_xdata()) for line in right.lines) == 5
+    assert [np.size(line.get_xdata()) for line in left.lines] == [2, 2, 3, 3]
+    assert sum(np.size(line.get_xdata()) for line in right.lines) == 5
