@@ -84,8 +84,8 @@ class SeveralHelpers:
         return self._improved(self._expected, mode_rule, best)
 
     def improved(self, mode_rule: str, plan: Plan, turns: int) -> Plan:
-        """A flight on the helpers' grids, improved without fading in so many turns at most."""
-        return self._improved(self._quiet, mode_rule, plan, turns)
+        """A flight on the helpers' grids, improved in so many turns at most."""
+        return self._improved(self._expected, mode_rule, plan, turns)
 
     def _earned(self, expected: ExpectedReward, mode_rule: str, plan: Plan) -> float:
         return float(expected([mode_rule], plan[0][1:], plan[1]).sum())

@@ -17,6 +17,10 @@ from hyuav.references.power import best_levels
 from hyuav.references.rewards import ExpectedReward
 
 
+DRAWS_OF_SEVERAL = 4
+"""Of a slot's fading, over which what it brings several helpers is averaged in flight."""
+
+
 class Plan(NamedTuple):
     """A flight before it is flown."""
 
@@ -51,7 +55,10 @@ class GeneralistPolicy(TensorDictModuleBase):
         scenes = scenes_of(scenario, mode_rule)
         self.world = World(scenes, Tokens.of([scenario] * scenes.count))
         physics = Physics(scenario, dtype=torch.float32)
-        self._quiet = ExpectedReward(physics, 1, torch.Generator())
+        self._quiet, self._expected = (
+            ExpectedReward(physics, draws, torch.Generator().manual_seed(0))
+            for draws in (1, DRAWS_OF_SEVERAL)
+        )
         self._turn = self._best_turn()
 
     def _best_turn(self) -> Tensor:
@@ -125,7 +132,7 @@ class GeneralistPolicy(TensorDictModuleBase):
         places[:, :, helper] = candidates
         power = share.unsqueeze(1).expand(places.shape[:-1])
         rewards, shares = best_levels(
-            self._quiet,
+            self._expected,
             self._quiet,
             [self.mode_rule],
             places.flatten(0, 1),

@@ -36,6 +36,9 @@ VIEWS = ((2, 21), (6, 11), (12, 17))
 
 VIEW_SIZE = sum(count**2 for _, count in VIEWS)
 
+DRAWS = 8
+"""Of a slot's fading, over which what it brings is averaged: the same at all places."""
+
 POWER_STEP = 5.0
 """Between the levels of power that are tried at each place, in dB."""
 
@@ -134,18 +137,24 @@ class Scenes:
         return maps[scene.unsqueeze(-1), index], index
 
 
-def scenes_of(scenario: Scenario, mode_rule: str) -> Scenes:
+def scenes_of(scenario: Scenario, mode_rule: str, draws: int = DRAWS) -> Scenes:
     """What is known of a scenario under a mode rule: a scene for each helper.
 
     Where there are several, each sees what a slot brings with the others where they are best, as
-    :func:`hyuav.learning.generalist.destinations.destinations` has it. Fading is left out: it
-    hardly changes which flight is best.
+    :func:`hyuav.learning.generalist.destinations.destinations` has it.
+
+    Args:
+        scenario: that is flown.
+        mode_rule: who chooses the modes.
+        draws: of a slot's fading that rewards are averaged over; 1 leaves it out.
     """
     physics = Physics(_within_coverage(scenario), dtype=torch.float32)
-    quiet = ExpectedReward(physics, 1, torch.Generator())
+    quiet, expected = (
+        ExpectedReward(physics, count, torch.Generator().manual_seed(0)) for count in (1, draws)
+    )
     others = destinations(physics, quiet, mode_rule)
     scenes = [
-        _scene_of_one(physics, quiet, mode_rule, helper, others)
+        _scene_of_one(expected, quiet, mode_rule, helper, others)
         for helper in range(scenario.num_helpers)
     ]
     return Scenes.joined(scenes)
@@ -158,12 +167,13 @@ def _within_coverage(scenario: Scenario) -> Scenario:
 
 
 def _scene_of_one(
-    physics: Physics,
+    expected: ExpectedReward,
     quiet: ExpectedReward,
     mode_rule: str,
     helper: int,
     others: tuple[Tensor, Tensor],
 ) -> Scenes:
+    physics = expected.physics
     scenario = physics.scenario
     spacing = max(
         scenario.max_speed * scenario.slot_duration / STEPS, scenario.map_side / MOST_SPACINGS
@@ -172,7 +182,7 @@ def _scene_of_one(
     own = grid.positions().to(physics.dtype)
     places, power = (each.expand(len(own), *each.shape).clone() for each in others)
     places[:, helper] = own
-    rewards, shares = best_levels(quiet, quiet, [mode_rule], places, power, helper, POWER_STEP)
+    rewards, shares = best_levels(expected, quiet, [mode_rule], places, power, helper, POWER_STEP)
     best = float(rewards.max())
     side = int(scenario.map_side / spacing * (1 + 1e-9)) + 1
     normalized = _square(rewards.reshape(grid.shape) / max(best, 1e-9), side, OUTSIDE)
