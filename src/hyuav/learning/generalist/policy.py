@@ -16,7 +16,6 @@ from hyuav.physics.slot import Physics
 from hyuav.references.power import best_levels
 from hyuav.references.rewards import ExpectedReward
 
-
 DRAWS_OF_SEVERAL = 4
 """Of a slot's fading, over which what it brings several helpers is averaged in flight."""
 
