@@ -31,7 +31,7 @@ class Lesson(NamedTuple):
 
     @classmethod
     def of(cls, ruled: Ruled) -> Self:
-        """Solve a scenario with one helper; fading, which costs eight times as much, is left out."""
+        """Solve a scenario with one helper; fading, which costs much, is left out."""
         scene = scenes_of(*ruled, draws=1)
         physics = Physics(ruled.scenario, dtype=torch.float64)
         spacing = float(scene.spacing)
