@@ -1,4 +1,4 @@
-"""Fly the generalist in a family of scenarios that it has never seen, beside the optimum of each.
+"""Fly the generalist in many scenarios that it has never seen.
 
 hyuav families family=one
 hyuav families family=two scenarios=50 output=runs/two

@@ -1,8 +1,8 @@
-"""Fly the generalist, which comes trained, in any scenario beside the optimum and the references.
+"""Fly the generalist, which comes trained, in any scenario.
 
 hyuav fly scenario=two_clusters
 hyuav fly scenario=disk scenario.num_ues=15 scenario.seed=4 refine=true
-hyuav fly scenario.legitimate_position=[20,-10] scenario.num_slots=30 output=flights/mine
+hyuav fly scenario.legitimate_position=[20,-10] scenario.num_slots=30
 """
 
 import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load

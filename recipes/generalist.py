@@ -1,7 +1,7 @@
-"""Train one policy for every layout, from scenarios that dynamic programming solves.
+"""Train one policy for every layout.
 
 hyuav generalist output=runs/generalist
-hyuav generalist scenarios=600 generalist.steps=2000
+hyuav generalist scenarios=600 learning.steps=2000
 """
 
 import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load

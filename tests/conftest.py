@@ -31,6 +31,10 @@ settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=T
 settings.load_profile("hyuav")
 
 
+HERE = "{here}"
+"""In what a command printed, in place of the test's directory."""
+
+
 @pytest.fixture(scope="session")
 def make() -> Callable[..., Any]:
     """Make the Gymnasium environment of one helper."""
@@ -131,11 +135,11 @@ def once(
                 call(*words)
             kept = tmp_path_factory.mktemp("kept") / "directory"
             shutil.copytree(tmp_path, kept)
-            called_before[calls] = kept, printed.getvalue()
+            called_before[calls] = kept, printed.getvalue().replace(str(tmp_path), HERE)
         kept, told = called_before[calls]
         shutil.copytree(kept, tmp_path, dirs_exist_ok=True)
         monkeypatch.chdir(tmp_path)
-        print(told, end="")
+        print(told.replace(HERE, str(tmp_path)), end="")
 
     return run
 

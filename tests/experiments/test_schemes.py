@@ -13,9 +13,12 @@ def test_every_mode_rule_is_learned_twice_and_has_an_optimum() -> None:
 
 def test_a_scheme_is_measured_against_the_optimum_of_its_mode_rule() -> None:
     assert {name: scheme.optimum for name, scheme in SCHEMES.items()} == {
-        **dict.fromkeys(("proposed", "proposed_paper", "optimum"), "optimum"),
-        **dict.fromkeys(("ja_ot", "ja_ot_paper", "ja_lt", "ja_optimum"), "ja_optimum"),
-        **dict.fromkeys(("re_ot", "re_ot_paper", "re_lt", "re_optimum"), "re_optimum"),
+        **dict.fromkeys(("proposed", "proposed_paper", "generalist", "optimum"), "optimum"),
+        **{
+            f"{rule}_{own}": f"{rule}_optimum"
+            for rule in ("ja", "re")
+            for own in ("ot", "ot_paper", "lt", "generalist", "optimum")
+        },
         **dict.fromkeys(("proposed_power", "optimum_power"), "optimum_power"),
         "no_helper": None,
     }

@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 
 from hyuav import Scenario, clusters
 from hyuav.experiments.run_directory import RunDirectory
-from hyuav.experiments.schemes import LABELS
+from hyuav.experiments.schemes import GENERALISTS, LABELS
 from hyuav.learning.ddpg import DDPG
 from recipe_calls import FEW, SHORT, Call, Refusal
 
@@ -189,7 +189,7 @@ def test_the_main_job_trains_evaluates_and_draws(call: Call, tmp_path: Path) -> 
         *SHORT,
     )
     summary = json.loads((tmp_path / "job" / "evaluation.json").read_text())
-    assert {*LABELS} - {"proposed_power"} <= set(summary["schemes"])
+    assert {*LABELS} - {"proposed_power", *GENERALISTS.values()} <= set(summary["schemes"])
     assert {"proposed", "proposed_paper", "re_ot_paper", "ja_ot_paper"} <= set(summary["schemes"])
     paper = RunDirectory(tmp_path / "job" / "as_in_paper").configuration()
     assert paper.algorithm == DDPG()

@@ -287,11 +287,11 @@ def test_a_checkpoint_flies_in_the_changed_scenario_until_it_does_not_fit(
 ) -> None:
     page = opened(_explorer, trained_runs)
     page.selectbox(key="pilot").set_value("tiny").run()
-    assert [own.label for own in page.metric] == ["Optimum", "Proposed", "No helper"]
+    assert [own.label for own in page.metric] == ["Optimum", "Generalist", "Proposed", "No helper"]
     assert "of the optimum" in page.metric[1].delta
     next(button for button in page.button if button.label == "Remove this node").click().run()
     assert errors(page) == ["number of UEs = 9: expected 10, for which the checkpoint was trained"]
-    assert [own.label for own in page.metric] == ["Optimum", "No helper"]
+    assert [own.label for own in page.metric] == ["Optimum", "Generalist", "No helper"]
 
 
 def test_the_optimum_is_refined_on_demand(tmp_path: Path) -> None:
