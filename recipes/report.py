@@ -1,4 +1,4 @@
-"""Write the report of a run, a comparison or a map of regimes: one HTML file.
+"""Write the report of a run, a comparison or a map, one HTML file.
 
 hyuav report run=runs/NAME
 hyuav report run=[runs/ONE,runs/OTHER]

@@ -6,7 +6,10 @@ import pytest
 import torch
 
 from hyuav import Scenario, make_env
+from hyuav.physics.slot import Physics
 from hyuav.references.optimum import solve_horizons
+from hyuav.references.power import ROUGH_DRAWS, best_levels, levels_of
+from hyuav.references.rewards import ExpectedReward
 
 VALUES = {
     "random_disk": {
@@ -48,3 +51,20 @@ def test_with_fading_the_chosen_power_earns_what_is_told() -> None:
     returns = flown["episode_reward"][:, -1]
     error = float(returns.std()) / 2000**0.5 + best.standard_error
     assert abs(float(returns.mean()) - best.value) < 5 * error
+
+
+@pytest.mark.parametrize("mode_rule", ["hybrid", "relay", "jamming"])
+def test_with_fading_the_best_of_all_levels_is_found(mode_rule: str) -> None:
+    scenario = dataclasses.replace(Scenario.preset("two_clusters"), power_control=True)
+    physics = Physics(scenario, dtype=torch.float64)
+    rough, expected = (
+        ExpectedReward(physics, draws, torch.Generator().manual_seed(0))
+        for draws in (ROUGH_DRAWS, 128)
+    )
+    places = torch.tensor([[-20.0, 5.0], [-30.0, 15.0], [10.0, -20.0], [70.0, 75.0]])
+    places = places.double().unsqueeze(1)
+    power = places.new_ones(len(places), 1)
+    found = best_levels(expected, rough, [mode_rule], places, power, 0, 1.0)[0][0]
+    levels = levels_of(scenario, 1.0)
+    tried = torch.stack([expected([mode_rule], places, power * level)[0] for level in levels])
+    torch.testing.assert_close(found, tried.amax(dim=0), rtol=2e-2, atol=1e-6)

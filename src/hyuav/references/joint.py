@@ -25,7 +25,7 @@ from hyuav.references.grid import (
     reaches_of,
     values_to_go,
 )
-from hyuav.references.power import best_levels, levels_of
+from hyuav.references.power import ROUGH_DRAWS, best_levels, levels_of
 from hyuav.references.rewards import ExpectedReward
 from hyuav.references.straight import jamming_destinations, relay_destination
 
@@ -71,6 +71,7 @@ class SeveralHelpers:
         self._window = window
         self._expected = ExpectedReward(physics, draws, generator)
         self._quiet = ExpectedReward(physics, 1, generator)
+        self._rough = ExpectedReward(physics, min(ROUGH_DRAWS, draws), generator)
         helpers = range(physics.scenario.num_helpers)
         self._grids = [grid_over_map(physics.scenario, resolution, helper) for helper in helpers]
 
@@ -169,7 +170,7 @@ class SeveralHelpers:
     ) -> Plan:
         """The plan with one helper's flight as good as can be near its own, the others' held."""
         (path, power), grid = plan, self._grids[helper]
-        positions = grid.positions()
+        positions, rough = grid.positions(), expected if expected is self._quiet else self._rough
         rewards, levels = [], []
         for places, shares in zip(path[1:], power, strict=True):
             near = ((positions - places[helper]).abs() <= self._window).all(dim=-1)
@@ -177,7 +178,7 @@ class SeveralHelpers:
             candidates[:, helper] = positions[near]
             others = shares.expand(len(candidates), -1)
             found, level = best_levels(
-                expected, self._quiet, [mode_rule], candidates, others, helper, self._step
+                expected, rough, [mode_rule], candidates, others, helper, self._step
             )
             reward, share = path.new_full((2, len(positions)), -torch.inf)
             reward[near], share[near] = found[0], level[0]

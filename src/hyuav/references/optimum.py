@@ -46,7 +46,7 @@ from hyuav.references.objectives import (
     reward_maps,
     why_no_optimum,
 )
-from hyuav.references.power import best_levels
+from hyuav.references.power import ROUGH_DRAWS, best_levels
 from hyuav.references.rewards import ExpectedReward, estimate_return
 
 RESOLUTION = 1.0
@@ -329,13 +329,13 @@ class _OneHelper:
             draws: of a slot's fading and tasks that the expected reward is averaged over.
             seed: of the draws.
         """
-        expected, quiet = (
+        expected, rough = (
             ExpectedReward(self._physics, count, torch.Generator().manual_seed(seed))
-            for count in (draws, 1)
+            for count in (draws, ROUGH_DRAWS)
         )
         places = self._grid.positions().unsqueeze(1)
         nominal = places.new_ones(len(places), 1)
-        maps = best_levels(expected, quiet, self._rules, places, nominal, 0, power_step)
+        maps = best_levels(expected, rough, self._rules, places, nominal, 0, power_step)
         for mode_rule, reward, share in zip(self._rules, *maps, strict=True):
             self._keep(mode_rule, reward, share)
 

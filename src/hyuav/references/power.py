@@ -9,7 +9,11 @@ from hyuav.physics.scenario import Scenario
 from hyuav.references.rewards import ExpectedReward, is_random
 
 NEAR = 2.0
-"""How far in dB from the best level without fading the best one with fading is sought."""
+"""How far in dB from the level that a few draws find best the one of all draws is sought."""
+
+ROUGH_DRAWS = 8
+"""Few draws. Without any, relays would be set apart by up to 10 dB: what is secret to most of them
+is so by their fading alone."""
 
 
 def levels_of(scenario: Scenario, step: float) -> Tensor:
@@ -27,7 +31,7 @@ def levels_of(scenario: Scenario, step: float) -> Tensor:
 
 def best_levels(
     expected: ExpectedReward,
-    quiet: ExpectedReward,
+    rough: ExpectedReward,
     mode_rules: Sequence[str],
     places: Tensor,
     power: Tensor,
@@ -36,11 +40,11 @@ def best_levels(
 ) -> tuple[Tensor, Tensor]:
     """The expected rewards with the best level of one helper's power, and that level.
 
-    All levels are tried without fading, and with it those near the best of them.
+    All levels are tried by few draws of the fading, and by all those near the best of them.
 
     Args:
         expected: over fading and tasks.
-        quiet: the same without fading.
+        rough: the same of :data:`ROUGH_DRAWS`.
         mode_rules: who chooses the modes.
         places: (P, H, 2) m.
         power: (P, H) of all helpers, in units of the nominal power; that helper's is not used.
@@ -50,7 +54,7 @@ def best_levels(
     Returns:
         (len(mode_rules), P) bps/Hz, and (len(mode_rules), P) in units of the nominal power.
     """
-    levels = levels_of(quiet.physics.scenario, step)
+    levels = levels_of(rough.physics.scenario, step)
     if len(levels) == 1:
         rewards = expected(mode_rules, places, None if bool((power == 1).all()) else power)
         return rewards, torch.ones_like(rewards)
@@ -59,8 +63,8 @@ def best_levels(
     best.fill_(-torch.inf)
     for number, level in enumerate(levels):
         power[:, helper] = level
-        _keep(best, index, quiet(mode_rules, places, power), places.new_tensor(number))
-    if expected is quiet or not is_random(quiet.physics):
+        _keep(best, index, rough(mode_rules, places, power), places.new_tensor(number))
+    if expected is rough or not is_random(rough.physics):
         return best, levels[index.long()]
     near = max(round(NEAR / step), 1)
     first = index.clone()

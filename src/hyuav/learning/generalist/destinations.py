@@ -18,12 +18,12 @@ ROUNDS = 2
 """How often each helper chooses anew."""
 
 
-def destinations(physics: Physics, quiet: ExpectedReward, mode_rule: str) -> tuple[Tensor, Tensor]:
+def destinations(physics: Physics, rough: ExpectedReward, mode_rule: str) -> tuple[Tensor, Tensor]:
     """Where helpers earn most that fly there straight and stay, found from several beginnings.
 
     Args:
         physics: of the scenario.
-        quiet: what slots bring without fading.
+        rough: what slots bring, by few draws of the fading.
         mode_rule: who chooses the modes.
 
     Returns:
@@ -47,7 +47,7 @@ def destinations(physics: Physics, quiet: ExpectedReward, mode_rule: str) -> tup
             own, shares = places.expand(len(tried), -1, -1).clone(), power.expand(len(tried), -1)
             own[:, helper] = tried
             rewards, levels = best_levels(
-                quiet, quiet, [mode_rule], own, shares, helper, POWER_STEP
+                rough, rough, [mode_rule], own, shares, helper, POWER_STEP
             )
             arrival = _slots_to(physics, places.unsqueeze(0)).expand(len(tried), -1).clone()
             arrival[:, helper] = slots[:, helper]

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from hyuav.learning.generalist.decide import Choice, Helpers, World, choices, flights
 from hyuav.learning.generalist.network import GeneralistNetwork
-from hyuav.learning.generalist.scene import CANDIDATES, POWER_STEP, TURNS, scenes_of
+from hyuav.learning.generalist.scene import CANDIDATES, POWER_STEP, ROUGH_DRAWS, TURNS, scenes_of
 from hyuav.learning.generalist.tokens import Tokens
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
@@ -54,9 +54,9 @@ class GeneralistPolicy(TensorDictModuleBase):
         scenes = scenes_of(scenario, mode_rule)
         self.world = World(scenes, Tokens.of([scenario] * scenes.count))
         physics = Physics(scenario, dtype=torch.float32)
-        self._quiet, self._expected = (
+        self._rough, self._expected = (
             ExpectedReward(physics, draws, torch.Generator().manual_seed(0))
-            for draws in (1, DRAWS_OF_SEVERAL)
+            for draws in (ROUGH_DRAWS, DRAWS_OF_SEVERAL)
         )
         self._turn = self._best_turn()
 
@@ -132,7 +132,7 @@ class GeneralistPolicy(TensorDictModuleBase):
         power = share.unsqueeze(1).expand(places.shape[:-1])
         rewards, shares = best_levels(
             self._expected,
-            self._quiet,
+            self._rough,
             [self.mode_rule],
             places.flatten(0, 1),
             power.flatten(0, 1),

@@ -36,8 +36,9 @@ VIEWS = ((2, 21), (6, 11), (12, 17))
 
 VIEW_SIZE = sum(count**2 for _, count in VIEWS)
 
-DRAWS = 8
-"""Of a slot's fading, over which what it brings is averaged: the same at all places."""
+DRAWS, ROUGH_DRAWS = 16, 2
+"""Of a slot's fading, over which what it brings is averaged, the same at all places; and how many
+of them tell roughly at which power."""
 
 POWER_STEP = 5.0
 """Between the levels of power that are tried at each place, in dB."""
@@ -149,12 +150,13 @@ def scenes_of(scenario: Scenario, mode_rule: str, draws: int = DRAWS) -> Scenes:
         draws: of a slot's fading that rewards are averaged over; 1 leaves it out.
     """
     physics = Physics(_within_coverage(scenario), dtype=torch.float32)
-    quiet, expected = (
-        ExpectedReward(physics, count, torch.Generator().manual_seed(0)) for count in (1, draws)
+    rough, expected = (
+        ExpectedReward(physics, count, torch.Generator().manual_seed(0))
+        for count in (min(ROUGH_DRAWS, draws), draws)
     )
-    others = destinations(physics, quiet, mode_rule)
+    others = destinations(physics, rough, mode_rule)
     scenes = [
-        _scene_of_one(expected, quiet, mode_rule, helper, others)
+        _scene_of_one(expected, rough, mode_rule, helper, others)
         for helper in range(scenario.num_helpers)
     ]
     return Scenes.joined(scenes)
@@ -168,7 +170,7 @@ def _within_coverage(scenario: Scenario) -> Scenario:
 
 def _scene_of_one(
     expected: ExpectedReward,
-    quiet: ExpectedReward,
+    rough: ExpectedReward,
     mode_rule: str,
     helper: int,
     others: tuple[Tensor, Tensor],
@@ -182,7 +184,7 @@ def _scene_of_one(
     own = grid.positions().to(physics.dtype)
     places, power = (each.expand(len(own), *each.shape).clone() for each in others)
     places[:, helper] = own
-    rewards, shares = best_levels(expected, quiet, [mode_rule], places, power, helper, POWER_STEP)
+    rewards, shares = best_levels(expected, rough, [mode_rule], places, power, helper, POWER_STEP)
     best = float(rewards.max())
     side = int(scenario.map_side / spacing * (1 + 1e-9)) + 1
     normalized = _square(rewards.reshape(grid.shape) / max(best, 1e-9), side, OUTSIDE)
