@@ -30,8 +30,15 @@ from hyuav.viz.paper.families import families_figure
 from hyuav.viz.paper.flights import save_flight_map
 from hyuav.viz.paper.style import save_figure
 
-BY = (None, "power_control", "mode_rule", "num_helpers", "num_ues", "num_slots")
-"""What the fractions are told by, after all of them together."""
+BY = {
+    None: "all",
+    "power_control": "power control",
+    "mode_rule": "",
+    "num_helpers": "helpers",
+    "num_ues": "UEs",
+    "num_slots": "slots",
+}
+"""What the fractions are told by, after all of them together, and its name in the table."""
 
 WORST = 5
 """Scenarios that are named."""
@@ -45,19 +52,20 @@ def main(config: Config, directory: Path) -> None:
         table = FamiliesDirectory(directory, config, options).complete(console)
     own = fractions(table)
     title = (
-        f"family {options.family}, {len(own)} scenarios, % of the optimum "
-        f"({len(table) - len(own)} left out, where it brings next to nothing)"
+        f"family {options.family}, % of the optimum; left out are "
+        f"{len(table) - len(own)} scenarios in which it brings next to nothing"
     )
     columns = ("refined\nmean", "5th per-\ncentile", "worst")
     shown = results_table(title, "", "scena-\nrios", "mean", "5th per-\ncentile", "worst", *columns)
-    for by in BY:
+    for by, named in BY.items():
         for _, row in distribution(own, by).iterrows():
             cells = (
                 percent(row[f"{name}_{what}"], 2 if what == "mean" else 1).rstrip(" %")
                 for name in ("generalist", "refined")
                 for what in ("mean", "p5", "worst")
             )
-            shown.add_row(f"{row['of']} {row['value']}".strip(), str(row["scenarios"]), *cells)
+            value = row["value"] if by else ""
+            shown.add_row(f"{named} {value}".strip(), str(row["scenarios"]), *cells)
     print_table(shown, console)
     tell_worst(own, console)
     save_figure(families_figure(own), directory, "families")

@@ -49,6 +49,9 @@ DRAWS = 16
 WORKING = ("output", "workers", "retries", "drawn")
 """What changes how the work is done and not what comes of it."""
 
+MOST_VALUES = 6
+"""Of a column, which are told one by one."""
+
 TABLE_FILE = "families.csv"
 
 
@@ -180,6 +183,16 @@ def fractions(table: pd.DataFrame) -> pd.DataFrame:
     return own
 
 
+def _binned(values: pd.Series) -> pd.Series:
+    """Values as they are, or the quarter of their range in which they lie, as FROM-TO."""
+    if values.nunique() <= MOST_VALUES:
+        return values.astype(str)
+    quarters = pd.cut(values, 4, include_lowest=True)
+    spans = values.groupby(quarters, observed=True).agg(["min", "max"])
+    names = {quarter: f"{own['min']:2d}-{own['max']:2d}" for quarter, own in spans.iterrows()}
+    return quarters.map(names)
+
+
 def distribution(own: pd.DataFrame, by: str | None = None) -> pd.DataFrame:
     """Mean, 5th percentile and worst of the fractions, of all or by a column.
 
@@ -190,8 +203,7 @@ def distribution(own: pd.DataFrame, by: str | None = None) -> pd.DataFrame:
     if by is None:
         groups = [("all", own)]
     else:
-        keys = pd.cut(own[by], 4, precision=0) if own[by].nunique() > 6 else own[by]
-        groups = [(str(key), part) for key, part in own.groupby(keys, observed=True)]
+        groups = [(str(key), part) for key, part in own.groupby(_binned(own[by]), observed=True)]
     rows = []
     for key, part in groups:
         row: dict[str, Any] = {"of": by or "", "value": key, "scenarios": len(part)}
