@@ -15,7 +15,7 @@ Points = tuple[tuple[float, float], ...]
 
 
 def world_of(scenarios: list[Scenario]) -> World:
-    scenes = Scenes.joined(scenes_of(scenario, "hybrid") for scenario in scenarios)
+    scenes = Scenes.joined(scenes_of(scenario, "hybrid", draws=1) for scenario in scenarios)
     return World(scenes, Tokens.of(scenarios))
 
 
