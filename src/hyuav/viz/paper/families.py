@@ -11,7 +11,7 @@ from hyuav.envs.rendering import OKABE_ITO
 from hyuav.viz.data.schemes import scheme_color
 from hyuav.viz.paper.style import PAGE_WIDTH, STYLE, legend_below
 
-LEAST_LOSS, MOST_LOSS = 0.01, 100.0
+LEAST_LOSS, MOST_LOSS = 0.01, 20.0
 """Of the axis, in %; what is less is drawn at the least."""
 
 RULES = {"hybrid": "generalist", "relay": "re_generalist", "jamming": "ja_generalist"}
