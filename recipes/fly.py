@@ -19,7 +19,7 @@ from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNu
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
 from hyuav.experiments.evaluation_table import print_results
-from hyuav.experiments.fly import RESOLUTION, fly
+from hyuav.experiments.fly import fly, usable_resolution
 from hyuav.experiments.scenarios import named_scenario
 from hyuav.viz.paper.flights import save_flight_map
 
@@ -32,8 +32,8 @@ class Fly(Parameters):
     seed: CountOrZero = parameter(0)
     refine: bool = parameter(False)
     """Improve the flights by a local search with the exact model."""
-    resolution: PositiveNumber = parameter(RESOLUTION, unit="m")
-    """Of the optimum's grid; finer ones take longer."""
+    resolution: PositiveNumber | None = parameter(None, unit="m")
+    """Of the optimum's grid; None for 4 m, or 10 m with several helpers. Finer ones take longer."""
 
 
 @recipe(
@@ -59,9 +59,8 @@ def main(config: Config, directory: Path) -> None:
     )
     save_flight_map(scenario, evaluation.flights, directory / "figures")
     print_results(evaluation, console)
-    print_line(
-        f"the optimum is of a grid of {options.resolution:g} m; finer: resolution=1", console
-    )
+    spacing = usable_resolution(scenario, options.resolution)
+    print_line(f"the optimum is of a grid of {spacing:g} m; finer: resolution=1", console)
     print_line(f"evaluation: {directory}, its map: figures/flight_map.png", console)
 
 

@@ -11,14 +11,22 @@ from hyuav.learning.generalist.refine import refined
 from hyuav.physics.scenario import Scenario, ScenarioLike, as_scenario
 from hyuav.references.optimum import solve_optimum
 
-RESOLUTION = 4.0
-"""In m, of the grid of the optimum that is shown beside: coarse, so that it takes a second."""
+RESOLUTION, RESOLUTION_OF_SEVERAL = 4.0, 10.0
+"""In m, of the grid of the optimum that is shown beside: coarse, so that it takes a second, or
+some with several helpers."""
 
 POWER_STEP = 3.0
 """In dB, between the levels of power that are tried there."""
 
-DRAWS = 32
+DRAWS, DRAWS_OF_SEVERAL = 32, 4
 """Of fading, over which its expected reward is averaged."""
+
+
+def usable_resolution(scenario: Scenario, resolution: float | None) -> float:
+    """The spacing in m of the optimum's grid, the default where it is None."""
+    if resolution is not None:
+        return resolution
+    return RESOLUTION if scenario.num_helpers == 1 else RESOLUTION_OF_SEVERAL
 
 
 def fly(
@@ -27,7 +35,7 @@ def fly(
     episodes: int = 100,
     seed: int = 0,
     refine: bool = False,
-    resolution: float = RESOLUTION,
+    resolution: float | None = None,
     output: str | Path | None = None,
     name: str | None = None,
 ) -> Evaluation:
@@ -40,7 +48,9 @@ def fly(
         episodes: of fading and tasks, at least 2.
         seed: of these.
         refine: improve its flights by a local search with the exact model.
-        resolution: of the optimum's grid in m.
+        resolution: of the optimum's grid in m; None for :data:`RESOLUTION`, or
+            :data:`RESOLUTION_OF_SEVERAL` with several helpers, whose best flight is then the best
+            that was found.
         output: directory that keeps the evaluation; None for none.
         name: of the scenario, for the record.
 
@@ -59,11 +69,16 @@ def fly(
     scenario = as_scenario(scenario)
     parameters = EvaluationParameters(episodes=episodes, seed=seed)
     checked(bool, "refine", refine)
-    checked(PositiveNumber, "resolution", resolution)
+    spacing = checked(PositiveNumber, "resolution", usable_resolution(scenario, resolution))
     policies, _ = straight_policies(scenario)
     policies |= generalist_policies(scenario, refine=refine)
     optima = solve_optimum(
-        scenario, resolution=resolution, power_step=POWER_STEP, draws=DRAWS, evaluation_draws=2
+        scenario,
+        resolution=spacing,
+        power_step=POWER_STEP,
+        draws=DRAWS if scenario.num_helpers == 1 else DRAWS_OF_SEVERAL,
+        evaluation_draws=2,
+        certify=False,
     )
     policies |= {OPTIMA[rule]: [optimum.policy] for rule, optimum in optima.items()}
     evaluation = evaluate(scenario, name or told, policies, parameters)
