@@ -79,8 +79,9 @@ def test_the_wheel_holds_the_library_the_recipes_and_nothing_else(dist: Path) ->
     source = ROOT / "src"
     library = {str(path.relative_to(source)) for path in source.rglob("*.py*") if path.is_file()}
     library = {name for name in library if "__pycache__" not in name}
-    templates = (source / "hyuav/viz/html/templates").iterdir()
-    data = {"hyuav/py.typed", *(str(path.relative_to(source)) for path in templates)}
+    folders = source / "hyuav/viz/html/templates", source / "hyuav/learning/generalist/weights"
+    files = [path for folder in folders for path in folder.iterdir()]
+    data = {"hyuav/py.typed", *(str(path.relative_to(source)) for path in files)}
     recipes = {f"hyuav/recipes/{path.name}" for path in (ROOT / "recipes").glob("*.py")}
     assert min(len(library), len(data), len(recipes)) > 1
     beside = {name for name in names if not name.startswith("hyuav-")}
