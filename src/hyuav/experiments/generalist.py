@@ -38,7 +38,7 @@ CHECKPOINT_FILE, PROGRESS_FILE, WEIGHTS_FILE = "training.pt", "progress.csv", "g
 class TrainGeneralist(Parameters):
     """From what a generalist learns, and where it is kept."""
 
-    scenarios: Count = parameter(6000)
+    scenarios: Count = parameter(5000)
     """That are solved for it to learn from."""
     validation: Annotated[int, Field(ge=1, le=10**6)] = parameter(200)
     """That are solved to judge it by."""
