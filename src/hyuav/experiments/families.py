@@ -12,7 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from rich.console import Console
 
-from hyuav._support.errors import Halted, ScenarioWarning
+from hyuav._support.errors import ScenarioWarning
 from hyuav._support.files import write_durably
 from hyuav._support.parameters import (
     Count,
@@ -23,7 +23,7 @@ from hyuav._support.parameters import (
     Text,
     parameter,
 )
-from hyuav._support.terminal import make_progress
+from hyuav.experiments.chunks import do_missing, ranges
 from hyuav.experiments.comparison.processes import Workers
 from hyuav.experiments.evaluation import EvaluationParameters, fly
 from hyuav.experiments.requests import keep_request
@@ -153,23 +153,12 @@ class FamiliesDirectory:
     def complete(self, console: Console) -> pd.DataFrame:
         """Fly what is not flown yet; a row for each scenario."""
         options = self._options
-        last = options.first + options.scenarios
         chunks = [
-            Chunk(
-                range(first, min(first + CHUNK, last)),
-                options,
-                self.path / "flown" / f"{first:06}.parquet",
-            )
-            for first in range(options.first, last, CHUNK)
+            Chunk(seeds, options, self.path / "flown" / f"{seeds.start:06}.parquet")
+            for seeds in ranges(options.first, options.scenarios, CHUNK)
         ]
-        left = [chunk for chunk in chunks if not chunk.file.exists()]
-        progress = make_progress(console, f"scenarios, in {CHUNK}s")
-        with progress, Workers(options.workers, options.retries) as workers:
-            task = progress.add_task("", total=len(chunks), completed=len(chunks) - len(left))
-            for _, reason in workers.attempt_all(Chunk.fly, left):
-                if reason is not None:
-                    raise Halted(f"failed: {reason}; what is flown is kept")
-                progress.advance(task)
+        workers = Workers(options.workers, options.retries)
+        do_missing(Chunk.fly, chunks, workers, console, f"scenarios, in {CHUNK}s")
         table = pd.concat([pd.read_parquet(chunk.file) for chunk in chunks], ignore_index=True)
         write_durably(self.path / TABLE_FILE, table.to_csv(index=False).encode())
         return table
@@ -206,7 +195,7 @@ def distribution(own: pd.DataFrame, by: str | None = None) -> pd.DataFrame:
         groups = [(str(key), part) for key, part in own.groupby(_binned(own[by]), observed=True)]
     rows = []
     for key, part in groups:
-        row: dict[str, Any] = {"of": by or "", "value": key, "scenarios": len(part)}
+        row: dict[str, Any] = {"value": key, "scenarios": len(part)}
         for name in ("generalist", "refined"):
             fraction = part[f"{name}_fraction"]
             row |= {

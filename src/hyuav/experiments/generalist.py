@@ -10,10 +10,10 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from rich.console import Console
 
-from hyuav._support.errors import Halted
 from hyuav._support.files import write_durably
 from hyuav._support.parameters import Count, CountOrZero, Parameters, Text, Threads, parameter
 from hyuav._support.terminal import make_progress
+from hyuav.experiments.chunks import do_missing, ranges
 from hyuav.experiments.comparison.processes import Workers
 from hyuav.experiments.requests import keep_request
 from hyuav.learning.checkpoint import load_checkpoint, save_checkpoint
@@ -129,17 +129,10 @@ class GeneralistDirectory:
 
     def _lessons(self, split: str, count: int, console: Console) -> Lessons:
         chunks = [
-            Chunk(split, range(first, min(first + CHUNK, count)), self._file(split, first))
-            for first in range(0, count, CHUNK)
+            Chunk(split, seeds, self._file(split, seeds.start)) for seeds in ranges(0, count, CHUNK)
         ]
-        left = [chunk for chunk in chunks if not chunk.file.exists()]
-        progress = make_progress(console, f"{split} scenarios, in {CHUNK}s")
-        with progress, Workers(self._options.workers, self._options.retries) as workers:
-            task = progress.add_task(split, total=len(chunks), completed=len(chunks) - len(left))
-            for _, reason in workers.attempt_all(Chunk.solve, left):
-                if reason is not None:
-                    raise Halted(f"failed: {reason}; what is solved is kept")
-                progress.advance(task)
+        workers = Workers(self._options.workers, self._options.retries)
+        do_missing(Chunk.solve, chunks, workers, console, f"{split} scenarios, in {CHUNK}s")
         solved = (lesson for chunk in chunks for lesson in chunk.load())
         return Lessons.of(solved).to(self._options.device)
 

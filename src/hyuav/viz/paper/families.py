@@ -8,14 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from hyuav.envs.rendering import OKABE_ITO
+from hyuav.experiments.schemes import GENERALISTS
 from hyuav.viz.data.schemes import scheme_color
 from hyuav.viz.paper.style import PAGE_WIDTH, STYLE, legend_below
 
 LEAST_LOSS, MOST_LOSS = 0.01, 20.0
 """Of the axis, in %; what is less is drawn at the least."""
-
-RULES = {"hybrid": "generalist", "relay": "re_generalist", "jamming": "ja_generalist"}
-"""The scheme whose color each mode rule has."""
 
 
 def families_figure(own: pd.DataFrame) -> Figure:
@@ -60,7 +58,7 @@ def _draw_distribution(axes: Axes, own: pd.DataFrame) -> None:
 
 
 def _draw_by_slots(axes: Axes, own: pd.DataFrame) -> None:
-    for rule, scheme in RULES.items():
+    for rule, scheme in GENERALISTS.items():
         part = own[own["mode_rule"] == rule]
         loss, color = _loss(part["generalist_fraction"]), scheme_color(scheme)
         axes.plot(part["num_slots"], loss, ".", color=color, markersize=4, label=rule)
