@@ -46,6 +46,14 @@ def test_positions_alone_are_a_scenario(tmp_path: Path) -> None:
     assert (tmp_path / "evaluation.json").is_file()
 
 
+def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_flown(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"^output = .*: expected a writable place"):
+        hyuav.fly("two_clusters", output=tmp_path / "file" / "below")
+
+
 def test_a_mistake_is_answered_by_one_line(refusal: Refusal) -> None:
     assert "episodes = 1: expected" in refusal("fly", "episodes=1")
     assert "resolution = 0" in refusal("fly", "resolution=0")

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from hyuav._support.files import require_writable
 from hyuav._support.parameters import PositiveNumber, checked
 from hyuav.experiments.evaluation import Evaluation, EvaluationParameters, evaluate
 from hyuav.experiments.policies import Policies, straight_policies
@@ -70,6 +71,8 @@ def fly(
     parameters = EvaluationParameters(episodes=episodes, seed=seed)
     checked(bool, "refine", refine)
     spacing = checked(PositiveNumber, "resolution", usable_resolution(scenario, resolution))
+    if output is not None:
+        require_writable("output", Path(output))
     policies, _ = straight_policies(scenario)
     policies |= generalist_policies(scenario, refine=refine)
     optima = solve_optimum(

@@ -69,7 +69,8 @@ def test_rows_elsewhere_are_flown_from_where_they_are() -> None:
 
 def test_where_nothing_can_be_earned_it_flies_all_the_same() -> None:
     scenario = dataclasses.replace(CASES["one"], coverage_radius=1.0)
-    with pytest.warns(UserWarning, match="nothing can be earned"):
+    with pytest.warns(UserWarning, match="nothing can be earned") as told:
         path, share = policy_of(scenario).plan()
+    assert [str(line.message)[:21] for line in told] == ["coverage_radius = 1 m"]
     assert path.isfinite().all()
     assert share.isfinite().all()

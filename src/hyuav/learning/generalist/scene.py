@@ -149,7 +149,8 @@ def scenes_of(scenario: Scenario, mode_rule: str, draws: int = DRAWS) -> Scenes:
         mode_rule: who chooses the modes.
         draws: of a slot's fading that rewards are averaged over; 1 leaves it out.
     """
-    physics = Physics(_within_coverage(scenario), dtype=torch.float32)
+    # Whoever flies is warned of coverage by the scenario itself.
+    physics = Physics(_within_coverage(scenario), dtype=torch.float32, layout_is_known=False)
     rough, expected = (
         ExpectedReward(physics, count, torch.Generator().manual_seed(0))
         for count in (min(ROUGH_DRAWS, draws), draws)
