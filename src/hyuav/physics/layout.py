@@ -158,13 +158,15 @@ def _disk(
     return tuple(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def in_disk(draws: Tensor, radius: float, center: tuple[Tensor | float, Tensor | float]) -> Tensor:
+def in_disk(
+    draws: Tensor, radius: Tensor | float, center: tuple[Tensor | float, Tensor | float]
+) -> Tensor:
     """Where uniform draws from [0, 1) lie in a disk, uniformly too.
 
     Args:
         draws: (..., 2), of the distance and the angle.
-        radius: in m.
-        center: x and y in m, each of shape (...) or one for all.
+        radius: in m, of shape (...) or one for all, as x and y of the next.
+        center: x and y in m.
 
     Returns:
         (..., 2) m.

@@ -9,11 +9,13 @@ import dataclasses
 from typing import Any, NamedTuple
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from hyuav._support.errors import require_choice
 from hyuav._support.parameters import CountOrZero, checked
 from hyuav._support.randomness import derived_seed
+from hyuav.physics.layout import in_disk
 from hyuav.physics.modes import MODE_RULES
 from hyuav.physics.scenario import Point, Scenario
 
@@ -118,9 +120,8 @@ def _users(
 
 def _in_disk(rng: np.random.Generator, radii: NDArray[np.float64]) -> NDArray[np.float64]:
     """Uniform in disks of these radii around the origin: (U, 2) m."""
-    distance, angle = radii * np.sqrt(rng.uniform(size=len(radii))), rng.uniform(size=len(radii))
-    turn = 2 * np.pi * angle
-    return distance[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    draws = torch.from_numpy(rng.uniform(size=(2, len(radii)))).mT
+    return in_disk(draws, torch.from_numpy(radii), (0.0, 0.0)).numpy()
 
 
 def _anywhere(rng: np.random.Generator, counts: tuple[int, int]) -> tuple[Point, ...]:

@@ -1,5 +1,6 @@
 """The nodes of scenarios as sets of tokens, any number of them, without padding."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple, Self
 
@@ -85,4 +86,4 @@ def _of_one(scenario: Scenario) -> tuple[Tensor, Tensor]:
 
 def _decibels(power: float) -> float:
     """Relative to 1 mW, at least -100 dB."""
-    return max(float(torch.tensor(power * 1e3).log10()) * 10.0, -100.0) / DECIBELS
+    return 10.0 * math.log10(max(power * 1e3, 1e-10)) / DECIBELS
