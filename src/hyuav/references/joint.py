@@ -70,19 +70,19 @@ class SeveralHelpers:
         self._physics, self._resolution, self._step = physics, resolution, power_step
         self._window = window
         self._expected = ExpectedReward(physics, draws, generator)
-        self._quiet = ExpectedReward(physics, 1, generator)
+        self._quiet = ExpectedReward(physics, 1, generator) if draws > 1 else self._expected
         self._rough = ExpectedReward(physics, min(ROUGH_DRAWS, draws), generator)
         helpers = range(physics.scenario.num_helpers)
         self._grids = [grid_over_map(physics.scenario, resolution, helper) for helper in helpers]
 
-    def best(self, mode_rule: str, num_slots: int) -> Plan:
-        """The best flights over so many slots."""
+    def best(self, mode_rule: str, num_slots: int, turns: int = TURNS) -> Plan:
+        """The best flights over so many slots, of beginnings improved in so many turns at most."""
         plans = [
-            self._improved(self._quiet, mode_rule, plan)
+            self._improved(self._quiet, mode_rule, plan, turns)
             for plan in self._beginnings(mode_rule, num_slots)
         ]
         best = max(plans, key=lambda plan: self._earned(self._quiet, mode_rule, plan))
-        return self._improved(self._expected, mode_rule, best)
+        return self._improved(self._expected, mode_rule, best, turns)
 
     def improved(self, mode_rule: str, plan: Plan, turns: int) -> Plan:
         """A flight on the helpers' grids, improved in so many turns at most."""
@@ -171,24 +171,30 @@ class SeveralHelpers:
         """The plan with one helper's flight as good as can be near its own, the others' held."""
         (path, power), grid = plan, self._grids[helper]
         positions, rough = grid.positions(), expected if expected is self._quiet else self._rough
-        rewards, levels = [], []
-        for places, shares in zip(path[1:], power, strict=True):
-            near = ((positions - places[helper]).abs() <= self._window).all(dim=-1)
-            candidates = places.expand(int(near.sum()), -1, -1).clone()
-            candidates[:, helper] = positions[near]
-            others = shares.expand(len(candidates), -1)
-            found, level = best_levels(
-                expected, rough, [mode_rule], candidates, others, helper, self._step
+        held = torch.cat([path[1:], power.unsqueeze(-1)], dim=-1)
+        held[:, helper] = 1.0
+        others, group = held.unique(dim=0, return_inverse=True)
+        near = (positions - path[1:, helper].unsqueeze(1)).abs() <= self._window
+        slot, own = near.all(dim=-1).nonzero(as_tuple=True)
+        # Where the others hover, slots bring the same.
+        case, index = (group[slot] * len(positions) + own).unique(return_inverse=True)
+        candidates, shares = others[case // len(positions)].split([2, 1], dim=-1)
+        candidates[:, helper] = positions[case % len(positions)]
+        found, level = (
+            each[0][index]
+            for each in best_levels(
+                expected, rough, [mode_rule], candidates, shares.squeeze(-1), helper, self._step
             )
-            reward, share = path.new_full((2, len(positions)), -torch.inf)
-            reward[near], share[near] = found[0], level[0]
-            rewards.append(reward.reshape(grid.shape).numpy())
-            levels.append(share.reshape(grid.shape))
+        )
+        rewards, levels = path.new_full((2, len(power), len(positions)), -torch.inf)
+        rewards[slot, own], levels[slot, own] = found, level
+        rewards = rewards.reshape(-1, *grid.shape).numpy()
+        levels = levels.reshape(-1, *grid.shape)
         flight = best_flight(rewards, values_to_go(rewards, reach), reach, grid.start)
         path, power = path.clone(), power.clone()
         path[:, helper] = grid.places(flight)
-        for slot, (row, column) in enumerate(flight[1:]):
-            power[slot, helper] = levels[slot][row, column]
+        row, column = flight[1:].T
+        power[:, helper] = levels[torch.arange(len(levels)), row, column]
         return path, power
 
 
