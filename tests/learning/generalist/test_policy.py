@@ -6,9 +6,11 @@ import pytest
 import torch
 
 from hyuav import Scenario, family, make_env, pretrained
+from hyuav.learning.generalist.plans import Plan
 from hyuav.learning.generalist.policy import GeneralistPolicy
 from hyuav.learning.generalist.refine import refined
 from hyuav.physics.slot import Physics
+from hyuav.references.optimum import solve_optimum
 from hyuav.references.rewards import estimate_return
 
 
@@ -74,3 +76,35 @@ def test_where_nothing_can_be_earned_it_flies_all_the_same() -> None:
     assert [str(line.message)[:21] for line in told] == ["coverage_radius = 1 m"]
     assert path.isfinite().all()
     assert share.isfinite().all()
+
+
+@pytest.mark.parametrize(("name", "seed"), [("many", 13), ("many", 22)])
+def test_several_helpers_earn_no_less_than_their_rough_flight(name: str, seed: int) -> None:
+    scenario, mode_rule = family(name, seed, "validation")
+    scenario = dataclasses.replace(scenario, fading=False)
+    physics = Physics(scenario, dtype=torch.float64)
+    led, rough = (
+        estimate_return(physics, path.double(), mode_rule, 1, torch.Generator(), share.double())[0]
+        for path, share in (
+            policy_of(scenario, mode_rule).plan(),
+            Plan.roughly_best(scenario, mode_rule),
+        )
+    )
+    assert led >= rough * (1 - 1e-5) > 10.0
+
+
+@pytest.mark.parametrize("seed", [15, 89])
+def test_no_flight_goes_to_the_lesser_of_two_places(seed: int) -> None:
+    scenario, mode_rule = family("one", seed)
+    optimum = solve_optimum(
+        scenario, [mode_rule], resolution=4.0, draws=32, evaluation_draws=2, certify=False
+    )[mode_rule]
+    policy, best = policy_of(scenario, mode_rule), optimum.policy
+    physics = Physics(scenario, dtype=torch.float64)
+    plan, better = policy.plan(), refined(policy)
+    flown, improved, highest = (
+        estimate_return(physics, path.double(), mode_rule, 200, torch.Generator().manual_seed(0))[0]
+        for path in (plan.path, better.path, best.path)
+    )
+    assert flown >= 0.97 * highest
+    assert improved >= 0.99 * highest

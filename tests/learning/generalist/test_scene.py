@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from hyuav import Scenario, family
+from hyuav.learning.generalist.plans import Plan
 from hyuav.learning.generalist.scene import CANDIDATES, OUTSIDE, TURNS, VIEWS, offsets, scenes_of
 from hyuav.physics.slot import Physics
 from hyuav.references.rewards import sum_rates
@@ -75,10 +76,11 @@ def test_the_turns_are_the_symmetries_of_the_square() -> None:
 
 def test_several_helpers_see_what_the_others_make_possible() -> None:
     scenario = Scenario.preset("contested")
-    scenes = scenes_of(scenario, "hybrid")
-    assert scenes.count == 2
-    # Alone, a helper at the start earns nothing here; with the other in its place it can.
-    assert float(scenes.best.min()) > 15.0
+    alone = scenes_of(scenario, "hybrid", draws=1)
+    together = scenes_of(scenario, "hybrid", 1, Plan.roughly_best(scenario, "hybrid").at_the_end)
+    assert together.count == alone.count == 2
+    assert bool((together.best > alone.best).all())
+    assert float(together.best.min()) > 15.0
 
 
 def test_with_power_a_map_tells_the_level_that_brings_most() -> None:

@@ -91,7 +91,7 @@ def moved(helpers: Helpers, chosen: Tensor) -> Helpers:
 
 @torch.no_grad()
 def flights(
-    network: GeneralistNetwork, world: World, scene: Tensor, turn: Tensor = TURNS[0]
+    network: GeneralistNetwork, world: World, scene: Tensor
 ) -> tuple[Tensor, list[Helpers]]:
     """Fly scenes of a world from their starts, without fading.
 
@@ -99,20 +99,18 @@ def flights(
         network: of the generalist.
         world: in which it flies.
         scene: (B,) int64, those that are flown.
-        turn: as for :func:`choices`.
 
     Returns:
         what each flight brings, (B,) in units of what the best place brings in a slot, and where
         the helpers were before each slot, as long as they fly.
     """
     scenes = world.scenes
-    turns = turn.to(scene.device).expand(len(scene), 2, 2)
     flight = torch.arange(len(scene), device=scene.device)
     helpers = Helpers(scene, scenes.start[scene], scenes.num_slots[scene].squeeze(-1))
     earned, flown = torch.zeros(len(scene), device=scene.device), []
     while len(flight):
         flown.append(helpers)
-        choice = choices(network, world, helpers, turns[flight])
+        choice = choices(network, world, helpers)
         chosen = choice.worth.argmax(dim=-1)
         earned[flight] += choice.rewards.gather(1, chosen.unsqueeze(-1)).squeeze(-1)
         after = moved(helpers, chosen)

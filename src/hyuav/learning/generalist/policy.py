@@ -3,13 +3,21 @@
 from typing import NamedTuple
 
 import torch
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from hyuav.learning.generalist.decide import Choice, Helpers, World, choices, flights
+from hyuav.learning.generalist.decide import Choice, Helpers, World, choices
 from hyuav.learning.generalist.network import GeneralistNetwork
-from hyuav.learning.generalist.scene import CANDIDATES, POWER_STEP, ROUGH_DRAWS, TURNS, scenes_of
+from hyuav.learning.generalist.plans import Plan, coarseness
+from hyuav.learning.generalist.scene import (
+    CANDIDATES,
+    DRAWS,
+    POWER_STEP,
+    ROUGH_DRAWS,
+    TURNS,
+    scenes_of,
+)
 from hyuav.learning.generalist.tokens import Tokens
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
@@ -19,14 +27,21 @@ from hyuav.references.rewards import ExpectedReward
 DRAWS_OF_SEVERAL = 4
 """Of a slot's fading, over which what it brings several helpers is averaged in flight."""
 
+FEW = 32
+"""Places within reach that several helpers choose from, with their powers: those worth most by few
+draws at the powers of the rough flight."""
 
-class Plan(NamedTuple):
-    """A flight before it is flown."""
+ON_FLIGHT = 1e-2
+"""In m, how near to its flight a helper is on it."""
 
-    path: Tensor
-    """(T + 1, H, 2) m, float64."""
-    share: Tensor
-    """(T, H), powers in units of the nominal one, float64."""
+
+class Seen(NamedTuple):
+    """How helpers look at the world, each way a row."""
+
+    turn: Tensor
+    """(B, 2, 2), the symmetry in which the network sees it."""
+    window: Tensor
+    """(B,) m, how far from the rough flight they may go."""
 
 
 class GeneralistPolicy(TensorDictModuleBase):
@@ -34,8 +49,9 @@ class GeneralistPolicy(TensorDictModuleBase):
 
     Reads ``position`` (..., H, 2) m and ``step_count`` (..., 1), writes ``action`` (..., 2 H), or
     (..., 3 H) where the power is controlled. Helpers decide one after another: each knows where
-    those before it go, and takes the others to stay where they are. One helper flies in that of the
-    map's eight symmetries in which it earns most without fading.
+    those before it go, and takes the others to go where a rough flight of all leads them. From the
+    start it flies the best of several flights: one helper by each of the map's symmetries, led by
+    the rough flight or not.
 
     Args:
         network: of the generalist.
@@ -51,23 +67,36 @@ class GeneralistPolicy(TensorDictModuleBase):
     ) -> None:
         super().__init__()
         self.network, self.scenario, self.mode_rule = network, scenario, mode_rule
-        scenes = scenes_of(scenario, mode_rule)
+        self._several = scenario.num_helpers > 1
+        self._rough = Plan.roughly_best(scenario, mode_rule)
+        draws = DRAWS if scenario.power_control else 4 * DRAWS
+        if self._several:
+            draws = ROUGH_DRAWS
+        scenes = scenes_of(scenario, mode_rule, draws, self._rough.at_the_end)
         self.world = World(scenes, Tokens.of([scenario] * scenes.count))
         physics = Physics(scenario, dtype=torch.float32)
-        self._rough, self._expected = (
-            ExpectedReward(physics, draws, torch.Generator().manual_seed(0))
-            for draws in (ROUGH_DRAWS, DRAWS_OF_SEVERAL)
+        self._few_draws, self._expected = (
+            ExpectedReward(physics, count, torch.Generator().manual_seed(0))
+            for count in (ROUGH_DRAWS, DRAWS_OF_SEVERAL if self._several else 4 * DRAWS)
         )
-        self._turn = self._best_turn()
+        self._seen, self._flight = self._best_flight()
 
-    def _best_turn(self) -> Tensor:
-        """The symmetry in which it flies best from the start: each is another way to see it."""
-        turns = torch.stack(TURNS)
-        if self.world.scenes.count > 1:
-            return turns[0]
-        scene = torch.zeros(len(turns), dtype=torch.int64)
-        earned, _ = flights(self.network, self.world, scene, turns)
-        return turns[int(earned.argmax())]
+    @torch.no_grad()
+    def _best_flight(self) -> tuple[Seen, Plan]:
+        """The flight that brings most of those to which its decisions lead, and how it looks."""
+        turns = torch.stack(TURNS[:1] if self._several else TURNS)
+        windows = torch.tensor([coarseness(self.scenario).spacing, torch.inf])
+        ways = Seen(turns.repeat_interleave(len(windows), dim=0), windows.repeat(len(turns)))
+        path, share = self._flown(ways)
+        everywhere = path[1:].transpose(0, 1), share.transpose(0, 1)
+        slots = self._expected([self.mode_rule], *(each.flatten(0, 1) for each in everywhere))
+        earned = slots.reshape(len(ways.turn), -1).sum(dim=-1)
+        best = int(earned.argmax())
+        flight = Plan(path[:, best], share[:, best])
+        rough = self._expected([self.mode_rule], self._rough.path[1:], self._rough.share).sum()
+        if float(rough) > float(earned[best]):
+            flight = self._rough
+        return Seen(*(each[best : best + 1] for each in ways)), flight
 
     @torch.no_grad()
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -84,36 +113,55 @@ class GeneralistPolicy(TensorDictModuleBase):
 
     def plan(self) -> Plan:
         """The flight from the start."""
-        scenario = self.scenario
-        position = torch.tensor(scenario.helper_starts, dtype=torch.float32)
-        step = scenario.max_speed * scenario.slot_duration
-        path, shares = [position], []
-        for slot in range(scenario.num_slots):
-            state = TensorDict(position=path[-1], step_count=torch.tensor([slot]))
-            action = self(state)["action"].unflatten(-1, (len(position), -1))
-            path.append(path[-1] + step * action[:, :2])
-            decibels = (action[:, 2:].sum(dim=-1) - 1.0) * scenario.power_range / 2
-            controlled = torch.full_like(decibels, float(scenario.power_control))
-            shares.append(10.0 ** (decibels * controlled / 10.0))
-        return Plan(torch.stack(path).double(), torch.stack(shares).double())
+        return Plan(*(each.double() for each in self._flight))
+
+    def _flown(self, seen: Seen) -> tuple[Tensor, Tensor]:
+        """Flights, one for each way of looking: (T + 1, B, H, 2) m and powers (T, B, H)."""
+        starts = torch.tensor(self.scenario.helper_starts, dtype=torch.float32)
+        path, powers = [starts.expand(len(seen.turn), -1, -1)], []
+        for slot in range(self.scenario.num_slots):
+            flown = torch.full((len(seen.turn),), slot)
+            target, power = self._decided(path[-1], flown, seen)
+            path.append(target)
+            powers.append(power)
+        return torch.stack(path), torch.stack(powers)
 
     def _act(self, position: Tensor, flown: Tensor) -> Tensor:
         """Actions (B, H, 2 or 3) at positions (B, H, 2) m after so many slots (B,)."""
+        slot = flown.clamp(max=self.scenario.num_slots - 1)
+        path, powers = self._flight
+        target, power = path[slot + 1], powers[slot]
+        off = ((position - path[slot]).abs() > ON_FLIGHT).flatten(1).any(dim=1)
+        if bool(off.any()):
+            seen = Seen(*(each.expand(int(off.sum()), *each.shape[1:]) for each in self._seen))
+            target[off], power[off] = self._decided(position[off], slot[off], seen)
+        return self._action(position, target, power)
+
+    def _decided(self, position: Tensor, slot: Tensor, seen: Seen) -> tuple[Tensor, Tensor]:
+        """Where helpers (B, H, 2) m fly in a slot (B,), and their powers (B, H)."""
         scenes, scenario = self.world.scenes, self.scenario
-        left = (scenario.num_slots - flown).clamp(min=1)
-        target, share = position.clone(), torch.ones_like(position[..., 0])
+        leading = self._rough.path[slot + 1]
+        target, share = leading.clone(), self._rough.share[slot]
         for helper in range(scenario.num_helpers):
             place = (position[:, helper] - scenes.corner[helper]) / scenes.spacing[helper]
             place = place.round().long().clamp(min=0, max=scenes.side - 1)
             scene = torch.full((len(position),), helper)
-            helpers = Helpers(scene, place, left)
-            choice = choices(self.network, self.world, helpers, self._turn)
+            helpers = Helpers(scene, place, scenario.num_slots - slot)
+            choice = choices(self.network, self.world, helpers, seen.turn)
             lattice = scenes.corner[helper] + scenes.spacing[helper] * place
             candidates = lattice.unsqueeze(1) + scenes.spacing[helper] * CANDIDATES
             worth, shares = self._worth(choice, candidates, helper, target, share)
-            chosen = worth.argmax(dim=-1, keepdim=True)
+            away = (candidates - leading[:, helper].unsqueeze(1)).abs().amax(dim=-1)
+            led = worth.where(away <= seen.window.unsqueeze(-1), -torch.inf)
+            lost = (led == -torch.inf).all(dim=-1, keepdim=True)  # too far from the rough flight
+            chosen = worth.where(lost, led).argmax(dim=-1, keepdim=True)
             share[:, helper] = shares.gather(1, chosen).squeeze(-1)
             target[:, helper] = candidates.gather(1, chosen.unsqueeze(-1).expand(-1, -1, 2))[:, 0]
+        return target, share
+
+    def _action(self, position: Tensor, target: Tensor, share: Tensor) -> Tensor:
+        """The actions that lead to places, at powers."""
+        scenario = self.scenario
         action = (target - position) / (scenario.max_speed * scenario.slot_duration)
         if scenario.power_control:
             power = 1.0 + 20.0 * share.log10() / scenario.power_range
@@ -125,19 +173,25 @@ class GeneralistPolicy(TensorDictModuleBase):
     ) -> tuple[Tensor, Tensor]:
         """What candidates (B, K, 2) m of a helper are worth, and their powers: (B, K) both."""
         scenes = self.world.scenes
-        if scenes.count == 1:
+        if not self._several:
             return choice.worth, scenes.shares[0, choice.cell]
         places = others.unsqueeze(1).expand(-1, candidates.shape[1], -1, -1).clone()
         places[:, :, helper] = candidates
         power = share.unsqueeze(1).expand(places.shape[:-1])
-        rewards, shares = best_levels(
+        later, best = choice.worth - choice.rewards, scenes.best[helper].clamp(min=1e-9)
+        now = self._few_draws([self.mode_rule], places.flatten(0, 1), power.flatten(0, 1))[0]
+        worth, shares = later + now.reshape(later.shape) / best, power[..., helper]
+        few = worth.topk(min(FEW, worth.shape[-1]), dim=-1).indices
+        row = torch.arange(len(few)).unsqueeze(-1)
+        rewards, levels = best_levels(
             self._expected,
-            self._rough,
+            self._few_draws,
             [self.mode_rule],
-            places.flatten(0, 1),
-            power.flatten(0, 1),
+            places[row, few].flatten(0, 1),
+            power[row, few].flatten(0, 1),
             helper,
             POWER_STEP,
         )
-        now = rewards[0].reshape(candidates.shape[:2]) / scenes.best[helper].clamp(min=1e-9)
-        return choice.worth - choice.rewards + now, shares[0].reshape(now.shape)
+        now = rewards[0].reshape(few.shape) / best
+        worth = torch.full_like(worth, -torch.inf).scatter(1, few, later.gather(1, few) + now)
+        return worth, shares.scatter(1, few, levels[0].reshape(few.shape).to(shares.dtype))

@@ -1,5 +1,6 @@
-"""A flight made better by a local search with the exact model."""
+"""A flight made better by local searches with the exact model, the first ones wide and coarse."""
 
+import math
 from typing import NamedTuple
 
 import torch
@@ -11,7 +12,7 @@ from hyuav.references.joint import SeveralHelpers
 
 
 class Search(NamedTuple):
-    """How finely flights are improved, so that it takes about a second."""
+    """How finely flights are improved, so that all searches take about a second."""
 
     resolution: float
     """In m, between the places that are tried."""
@@ -21,22 +22,27 @@ class Search(NamedTuple):
     """In m, how far a slot's place moves at most."""
     draws: int
     """Of a slot's fading, over which what it brings is averaged."""
+    rounds: int
+    """How often each helper's flight is improved at most, with the others' held."""
 
 
-OF_ONE, OF_SEVERAL = Search(1.0, 3.0, 10.0, 8), Search(2.0, 5.0, 4.0, 4)
-"""For one helper, and for several."""
+OF_ONE = Search(4.0, 10.0, math.inf, 8, 1), Search(1.0, 5.0, 6.0, 32, 1)
+"""For one helper, one after another: one that goes to the lesser of two places is led to the other
+by the first, and the second makes it exact."""
+
+OF_SEVERAL = (Search(2.0, 5.0, 4.0, 4, 2),)
+"""For several."""
 
 
 def refined(policy: GeneralistPolicy) -> FlightPolicy:
-    """The flight of a policy, improved by dynamic programming in a tube around it.
-
-    Of several helpers each flies twice more at most, with the others held.
-    """
+    """The flight of a policy, improved by dynamic programming in tubes around it."""
     scenario = policy.scenario
-    search = OF_ONE if scenario.num_helpers == 1 else OF_SEVERAL
     physics = Physics(scenario, dtype=torch.float64)
-    improving = SeveralHelpers(
-        physics, search.resolution, search.power_step, search.draws, 0, search.window
-    )
-    path, share = improving.improved(policy.mode_rule, policy.plan(), 2 * scenario.num_helpers)
+    path, share = policy.plan()
+    for search in OF_ONE if scenario.num_helpers == 1 else OF_SEVERAL:
+        improving = SeveralHelpers(
+            physics, search.resolution, search.power_step, search.draws, 0, search.window
+        )
+        turns = search.rounds * scenario.num_helpers
+        path, share = improving.improved(policy.mode_rule, (path, share), turns)
     return FlightPolicy(flyable(path, physics, policy.mode_rule), scenario, share)

@@ -8,14 +8,13 @@ whole map and have the same size in every scenario. The nodes themselves are a s
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
-from hyuav.learning.generalist.destinations import destinations
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.grid import grid_over_map, reaches_of
@@ -40,8 +39,8 @@ DRAWS, ROUGH_DRAWS = 16, 2
 """Of a slot's fading, over which what it brings is averaged, the same at all places; and how many
 of them tell roughly at which power."""
 
-POWER_STEP = 5.0
-"""Between the levels of power that are tried at each place, in dB."""
+POWER_STEP, ROUGH_STEP = 5.0, 15.0
+"""Between the levels of power that are tried at each place, in dB, for one helper and several."""
 
 EDGE = 1e-4
 """In m, what is taken off the radius of coverage."""
@@ -67,6 +66,15 @@ def offsets(spacing: int, count: int, device: torch.device | str = "cpu") -> Ten
 
 CANDIDATES = offsets(1, REACH)
 """Where a helper may be in the next slot, from where it is: (REACH^2, 2) spacings."""
+
+
+class Others(NamedTuple):
+    """Where helpers are that others decide about."""
+
+    places: Tensor
+    """(H, 2) m."""
+    power: Tensor
+    """(H,), in units of the nominal one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,26 +146,27 @@ class Scenes:
         return maps[scene.unsqueeze(-1), index], index
 
 
-def scenes_of(scenario: Scenario, mode_rule: str, draws: int = DRAWS) -> Scenes:
+def scenes_of(
+    scenario: Scenario, mode_rule: str, draws: int = DRAWS, others: Others | None = None
+) -> Scenes:
     """What is known of a scenario under a mode rule: a scene for each helper.
-
-    Where there are several, each sees what a slot brings with the others where they are best, as
-    :func:`hyuav.learning.generalist.destinations.destinations` has it.
 
     Args:
         scenario: that is flown.
         mode_rule: who chooses the modes.
         draws: of a slot's fading that rewards are averaged over; 1 leaves it out.
+        others: where each helper sees the others, and their powers; None for their starts.
     """
     # Whoever flies is warned of coverage by the scenario itself.
     physics = Physics(_within_coverage(scenario), dtype=torch.float32, layout_is_known=False)
-    rough, expected = (
-        ExpectedReward(physics, count, torch.Generator().manual_seed(0))
-        for count in (min(ROUGH_DRAWS, draws), draws)
-    )
-    others = destinations(physics, rough, mode_rule)
+    rough = ExpectedReward(physics, min(ROUGH_DRAWS, draws), torch.Generator().manual_seed(0))
+    expected = rough
+    if draws > ROUGH_DRAWS:
+        expected = ExpectedReward(physics, draws, torch.Generator().manual_seed(0))
+    starts = physics.nodes.helper
+    seen = others or Others(starts, starts.new_ones(len(starts)))
     scenes = [
-        _scene_of_one(expected, rough, mode_rule, helper, others)
+        _scene_of_one(expected, rough, mode_rule, helper, seen)
         for helper in range(scenario.num_helpers)
     ]
     return Scenes.joined(scenes)
@@ -174,7 +183,7 @@ def _scene_of_one(
     rough: ExpectedReward,
     mode_rule: str,
     helper: int,
-    others: tuple[Tensor, Tensor],
+    others: Others,
 ) -> Scenes:
     physics = expected.physics
     scenario = physics.scenario
@@ -185,7 +194,8 @@ def _scene_of_one(
     own = grid.positions().to(physics.dtype)
     places, power = (each.expand(len(own), *each.shape).clone() for each in others)
     places[:, helper] = own
-    rewards, shares = best_levels(expected, rough, [mode_rule], places, power, helper, POWER_STEP)
+    step = POWER_STEP if scenario.num_helpers == 1 else ROUGH_STEP
+    rewards, shares = best_levels(expected, rough, [mode_rule], places, power, helper, step)
     best = float(rewards.max())
     side = int(scenario.map_side / spacing * (1 + 1e-9)) + 1
     normalized = _square(rewards.reshape(grid.shape) / max(best, 1e-9), side, OUTSIDE)
