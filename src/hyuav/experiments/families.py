@@ -40,10 +40,10 @@ CHUNK = 5
 LEAST = 1.0
 """bps/Hz that the optimum must bring, or a scenario is left out."""
 
-POWER_STEP = 1.0
-"""In dB, between the levels of power that the optimum chooses from."""
+POWER_STEP, POWER_STEP_OF_SEVERAL = 1.0, 5.0
+"""In dB, between the levels of power that the optimum chooses from: of one helper, of several."""
 
-DRAWS = 16
+DRAWS, DRAWS_OF_SEVERAL = 16, 4
 """Of fading, over which the optimum's expected reward is averaged."""
 
 WORKING = ("output", "workers", "retries", "drawn")
@@ -101,12 +101,13 @@ def flown(seed: int, options: Families) -> dict[str, Any]:
     planned = perf_counter()
     better = refined(policy)
     seconds = planned - begun, perf_counter() - planned
+    several = scenario.num_helpers > 1
     best = solve_optimum(
         scenario,
         [rule],
         resolution=options.resolution,
-        power_step=POWER_STEP,
-        draws=DRAWS,
+        power_step=POWER_STEP_OF_SEVERAL if several else POWER_STEP,
+        draws=DRAWS_OF_SEVERAL if several else DRAWS,
         evaluation_draws=2,
         certify=False,
     )[rule]
