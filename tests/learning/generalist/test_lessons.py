@@ -9,7 +9,7 @@ from hyuav import family, solve_optimum
 from hyuav.learning.generalist.decide import Helpers, flights
 from hyuav.learning.generalist.lessons import Lesson, Lessons
 from hyuav.learning.generalist.network import GeneralistNetwork
-from hyuav.learning.generalist.scene import CANDIDATES
+from hyuav.learning.generalist.scene import REACH, TURNS, window
 from hyuav.physics.scenario_families import Ruled
 
 SEEDS = (1, 4, 6)
@@ -41,7 +41,8 @@ def test_the_best_candidates_lead_to_the_optimum(lessons: list[Lesson]) -> None:
     scenes = several.world.scenes
     scene = torch.arange(scenes.count)
     helpers = Helpers(scene, scenes.start, scenes.num_slots.squeeze(-1))
-    rewards, index = scenes.around(scenes.rewards, scene, scenes.start, CANDIDATES)
+    index = window(scenes.side, scenes.start, 1, REACH, TURNS[0].expand(scenes.count, 2, 2))
+    rewards = scenes.told(scenes.rewards, scene, index)
     worth = (rewards + several.values(helpers, index)).where(rewards >= 0, -torch.inf)
     torch.testing.assert_close(worth.amax(dim=-1), several.optimum, rtol=2e-3, atol=0.0)
 

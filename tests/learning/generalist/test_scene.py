@@ -8,7 +8,15 @@ import torch
 
 from hyuav import Scenario, family
 from hyuav.learning.generalist.plans import Plan
-from hyuav.learning.generalist.scene import CANDIDATES, OUTSIDE, TURNS, VIEWS, offsets, scenes_of
+from hyuav.learning.generalist.scene import (
+    CANDIDATES,
+    OUTSIDE,
+    TURNS,
+    VIEWS,
+    offsets,
+    scenes_of,
+    window,
+)
 from hyuav.physics.slot import Physics
 from hyuav.references.rewards import sum_rates
 
@@ -50,7 +58,8 @@ def test_views_tell_the_best_nearby() -> None:
 def test_beyond_the_edge_a_map_tells_that_it_ends() -> None:
     scene = scenes_of(TINY, "hybrid")
     zero = torch.zeros(1, dtype=torch.int64)
-    told, _ = scene.around(scene.rewards, zero, torch.tensor([[0, 0]]), CANDIDATES)
+    corner = window(scene.side, torch.tensor([[0, 0]]), 1, 21, TURNS[0].unsqueeze(0))
+    told = scene.told(scene.rewards, zero, corner)
     square = told.reshape(21, 21)
     assert (square[:10] == OUTSIDE).all()
     assert (square[:, :10] == OUTSIDE).all()
@@ -91,3 +100,12 @@ def test_with_power_a_map_tells_the_level_that_brings_most() -> None:
     assert set(levels.tolist()) <= {float(level) for level in range(0, 61, 5)}
     fixed = scenes_of(dataclasses.replace(scenario, power_control=False), "jamming")
     assert float(scene.best) >= float(fixed.best)
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_a_turned_window_reads_the_map_along_turned_axes(turn: torch.Tensor) -> None:
+    index = window(7, torch.tensor([[2, 5]]), 2, 5, turn.unsqueeze(0))
+    places = torch.tensor([2, 5]) + offsets(2, 5) @ turn.T
+    inside = ((places >= 0) & (places < 7)).all(dim=-1)
+    expected = torch.where(inside, places[:, 0] * 7 + places[:, 1], 49)
+    assert torch.equal(index[0], expected)

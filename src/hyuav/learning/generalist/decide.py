@@ -13,7 +13,7 @@ from hyuav.learning.generalist.scene import (
     TURNS,
     VIEWS,
     Scenes,
-    offsets,
+    window,
 )
 from hyuav.learning.generalist.tokens import Tokens
 
@@ -66,19 +66,20 @@ def choices(
         of all candidates, in the order of the world as it is.
     """
     scenes, scene, place = world.scenes, helpers.scene, helpers.place
-    turns = turn.to(place.device).expand(len(scene), 2, 2)
-    candidates = CANDIDATES.to(place.device)
-    rewards, index = scenes.around(scenes.rewards, scene, place, candidates)
-    views = []
-    for number, view in enumerate(VIEWS):
-        at = offsets(*view, place.device) @ turns.mT
-        views.append(scenes.around(scenes.views[:, number], scene, place, at)[0])
+    size, side = len(scene), scenes.side
+    turns, straight = (own.to(place.device).expand(size, 2, 2) for own in (turn, TURNS[0]))
+    index = window(side, place, 1, REACH, straight)
+    rewards = scenes.told(scenes.rewards, scene, index)
+    views = [
+        scenes.told(scenes.views, scene * len(VIEWS) + number, window(side, place, *view, turns))
+        for number, view in enumerate(VIEWS)
+    ]
     position = scenes.corner[scene] + scenes.spacing[scene] * place
     tokens, owner = world.tokens.around(scene, position, turns)
     values = network(torch.cat(views, dim=-1).float(), tokens, owner, helpers.slots_left - 1)
     # Where the network has the candidates: the way of the inverse turn.
-    row, column = (candidates @ turns).unbind(dim=-1)
-    values = values.gather(1, row * REACH + column + len(candidates) // 2)
+    middle = torch.full_like(place, REACH // 2)
+    values = values.gather(1, window(REACH, middle, 1, REACH, turns.mT))
     allowed = scenes.reachable[scene] & (rewards > OUTSIDE)
     return Choice((rewards + values).where(allowed, -torch.inf), rewards, index)
 

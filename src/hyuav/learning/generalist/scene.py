@@ -68,6 +68,26 @@ CANDIDATES = offsets(1, REACH)
 """Where a helper may be in the next slot, from where it is: (REACH^2, 2) spacings."""
 
 
+def window(side: int, place: Tensor, spacing: int, count: int, turns: Tensor) -> Tensor:
+    """Where a square of places around each helper stands in its map: (B, count^2) int64.
+
+    Args:
+        side: of the map; what lies beyond it stands at side^2.
+        place: (B, 2) int64, row and column of each helper.
+        spacing: of the square's places, in those of the lattice.
+        count: of its places along each side, odd.
+        turns: (B, 2, 2) int64, one of :data:`TURNS` each: the square's axes lead along rows and
+            columns, or the other way, forward or back.
+    """
+    along = turns.abs().argmax(dim=1)
+    sign = turns.sum(dim=1).unsqueeze(-1)
+    axis = (torch.arange(count, device=place.device) - count // 2) * spacing
+    at = place.gather(1, along).unsqueeze(-1) + sign * axis
+    stride = torch.where(along == 0, side, 1).unsqueeze(-1)
+    first, second = (at * stride).where((at >= 0) & (at < side), side**2).unbind(dim=1)
+    return (first.unsqueeze(-1) + second.unsqueeze(-2)).clamp(max=side**2).flatten(1)
+
+
 class Others(NamedTuple):
     """Where helpers are that others decide about."""
 
@@ -125,25 +145,10 @@ class Scenes:
         """Places along one side of the maps."""
         return round((self.rewards.shape[-1] - 1) ** 0.5)
 
-    def around(
-        self, maps: Tensor, scene: Tensor, place: Tensor, at: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """What maps tell of places around helpers.
-
-        Args:
-            maps: (S, side^2 + 1), a row for each scene.
-            scene: (B,) int64, of each helper.
-            place: (B, 2) int64, row and column of each helper.
-            at: (K, 2), such as :data:`CANDIDATES`.
-
-        Returns:
-            (B, K), and where in the row it stands, (B, K) int64.
-        """
-        side = self.side
-        row, column = (place.unsqueeze(-2) + at).unbind(dim=-1)
-        inside = (row >= 0) & (row < side) & (column >= 0) & (column < side)
-        index = torch.where(inside, row * side + column, side**2)
-        return maps[scene.unsqueeze(-1), index], index
+    def told(self, maps: Tensor, row: Tensor, index: Tensor) -> Tensor:
+        """What maps (..., side^2 + 1) tell in rows (B,) of all of them, (B, K) at ``index``."""
+        flat = (row * maps.shape[-1]).unsqueeze(-1) + index
+        return maps.view(-1).index_select(0, flat.flatten()).view_as(index)
 
 
 def scenes_of(
