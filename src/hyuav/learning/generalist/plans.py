@@ -22,7 +22,7 @@ class Coarseness(NamedTuple):
     """How often each helper's flight is improved at most, with the others' held."""
 
 
-OF_ONE, OF_SEVERAL = Coarseness(5.0, 32, 1), Coarseness(20.0, 1, 2)
+OF_ONE, OF_SEVERAL = Coarseness(4.0, 32, 1), Coarseness(20.0, 1, 2)
 """For one helper, and for several."""
 
 POWER_STEP = 15.0
