@@ -170,6 +170,23 @@ def test_shards_of_random_layouts_and_of_a_peer_train_in_processes(
     assert "torchrl" not in printed.out + printed.err
 
 
+def test_the_generalist_is_there_before_the_first_episode(
+    call: Call, tmp_path: Path, capsys: Printed
+) -> None:
+    entries = ["algorithm=[generalist]", "scenario=two_clusters", "scheme=[hybrid,relay]"]
+    call("compare", *entries, *TINY_COMPARISON)
+    results = pd.read_parquet(tmp_path / "here" / "results.parquet")
+    assert set(results["algorithm"]) == {"generalist"}
+    assert (results["episodes_to_threshold"] == 0).all()
+    assert results["fraction"].min() > 0.97
+    assert results["stopped"].isna().all()
+    assert results.groupby("scheme")["earned"].nunique().eq(1).all()  # it depends on no seed
+    curves = pd.read_parquet(tmp_path / "here" / "curves.parquet")
+    assert sorted(set(curves["episode"])) == [0, 4]
+    assert "Generalist" in capsys.readouterr().out
+    assert (tmp_path / "here" / "report.html").is_file()
+
+
 def test_a_variant_is_compared_without_its_pieces(
     call: Call, tmp_path: Path, capsys: Printed
 ) -> None:

@@ -14,7 +14,13 @@ from hyuav.learning.sac import SAC
 from hyuav.learning.td3 import TD3
 
 PEER = "stable_baselines3"
-"""In a comparison, that library's DDPG; no algorithm may have its name."""
+"""In a comparison, that library's DDPG."""
+
+GENERALIST = "generalist"
+"""In a comparison, the policy for every layout as it is shipped."""
+
+BESIDE = (PEER, GENERALIST)
+"""What is compared and no algorithm of this registry; no algorithm may have such a name."""
 
 
 def _accept(name: str, algorithm: Any, reference: str | None) -> type[AlgorithmParameters]:
@@ -83,6 +89,6 @@ def register(name: str, algorithm: type[AlgorithmParameters]) -> None:
 def _require_name(name: Any) -> None:
     written = isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9_]*", name)
     # ..._robust stands for variants of a plain one
-    if not written or name in (*BUILT_IN, PEER) or name.endswith("_robust"):
+    if not written or name in (*BUILT_IN, *BESIDE) or name.endswith("_robust"):
         accepted = "lower-case letters, digits and underscores, and a name that is not taken"
         raise InputError(rejection("algorithm", name, accepted))

@@ -18,7 +18,7 @@ from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.experiments.requests import keep_request
 from hyuav.experiments.run_directory import RunConfiguration
 from hyuav.experiments.tracking import LoggerParameters
-from hyuav.learning.registry import ALGORITHMS, PEER
+from hyuav.learning.registry import ALGORITHMS, BESIDE
 from hyuav.learning.training import TrainingParameters
 from hyuav.references.objectives import why_no_optimum
 from hyuav.references.optimum import usable_resolution
@@ -91,7 +91,7 @@ class ComparisonDirectory:
         plain = {
             f"hyperparameters.{entry}": ALGORITHMS[PLAIN.get(name, name)]().to_dict()
             for entry in self.options.entries
-            if (name := entry.partition("-")[0]) != PEER
+            if (name := entry.partition("-")[0]) not in BESIDE
         }
         return {"shard_learners": Compare.shard_learners, "reward": SUM_RATE, **plain}
 

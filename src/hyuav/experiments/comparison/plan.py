@@ -33,13 +33,13 @@ from hyuav.learning.ddpg import DDPG
 from hyuav.learning.guide.parameters import OFF
 from hyuav.learning.guide.robust import Robust
 from hyuav.learning.learners import Learner
-from hyuav.learning.registry import ALGORITHMS, PEER
+from hyuav.learning.registry import ALGORITHMS, BESIDE, PEER
 from hyuav.learning.training import TrainingParameters
 from hyuav.physics.layout import random_layout
 from hyuav.physics.modes import MODE_RULES, ModeRuleName
 from hyuav.physics.scenario import Scenario
 
-ENTRIES = (*ALGORITHMS, PEER)
+ENTRIES = (*ALGORITHMS, *BESIDE)
 """What can be compared."""
 
 PLAIN = {name: name.removesuffix("_robust") for name in ALGORITHMS}
@@ -115,7 +115,7 @@ class Compare(Parameters):
             if is_reference(name):
                 ALGORITHMS.find(name)
             place = f"algorithm[{index}]" if len(self.algorithm) > 1 else "algorithm"
-            require_choice(place, name, [*ALGORITHMS.names(), PEER])
+            require_choice(place, name, [*ALGORITHMS.names(), *BESIDE])
         for name in ("algorithm", "without", "scheme", "num_slots"):
             values = getattr(self, name)
             if len(set(values)) < len(values):
@@ -177,7 +177,7 @@ def parameters_of(entry: str) -> AlgorithmParameters:
             as in the plain algorithm; one that the algorithm does not have changes nothing.
     """
     name, _, piece = entry.partition("-")
-    if name == PEER:
+    if name in BESIDE:
         return DDPG()
     own, plain = ALGORITHMS[name](), ALGORITHMS[PLAIN.get(name, name)]()
     if isinstance(own, Robust) and own.guide is not None and piece in OFF:

@@ -15,6 +15,7 @@ from hyuav._support.errors import BusyError, Halted, InputError, rejection
 from hyuav._support.files import read_parquet, rename_durably, write_durably
 from hyuav._support.registry import file_name
 from hyuav.envs.rewards import DEFAULT
+from hyuav.experiments.comparison import generalist
 from hyuav.experiments.comparison.optima import Optima
 from hyuav.experiments.comparison.plan import training_episodes
 from hyuav.experiments.evaluation import EvaluationParameters, fly
@@ -24,7 +25,7 @@ from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
 from hyuav.experiments.schemes import LEARNED, NO_HELPER, OPTIMA
 from hyuav.experiments.tracking import LoggerParameters, in_group
 from hyuav.experiments.train import resume, train
-from hyuav.learning.registry import PEER
+from hyuav.learning.registry import BESIDE, GENERALIST
 from hyuav.references.straight import no_helper
 
 TABLES = RESULTS_FILE, CURVES_FILE = "results.parquet", "curves.parquet"
@@ -42,7 +43,8 @@ class Shard:
     """Learners of one algorithm, scenario and horizon, which one worker trains side by side.
 
     Its directory is a run directory with two tables more, :meth:`tables`; that of
-    Stable-Baselines3 holds the tables alone. It is there once all of it is written.
+    Stable-Baselines3 or of the generalist holds the tables alone. It is there once all of it is
+    written.
     """
 
     entry: str
@@ -103,18 +105,24 @@ class Shard:
         if self.path.exists():  # and is damaged, but may hold a checkpoint
             _clear(partial)
             self.path.rename(partial)
-        if self.entry == PEER:
-            from hyuav.experiments.comparison import stable_baselines  # an optional library
-
+        if self.entry in BESIDE:
             _clear(partial)
             partial.mkdir(parents=True)
-            self._keep(partial, *stable_baselines.train(self.configuration, self.evaluation))
+            self._keep(partial, *self._beside())
         else:
             self._train(partial)
             self._keep(partial, *self._reached(RunDirectory(partial)))
         rename_durably(partial, self.path)
         for checkpoint in (finished.previous_checkpoint, finished.last_checkpoint):
             checkpoint.unlink(missing_ok=True)  # nothing goes on from them any more
+
+    def _beside(self) -> tuple[pd.DataFrame, list[float], list[float]]:
+        """What :meth:`_reached` tells, of what is no algorithm of this project."""
+        if self.entry == GENERALIST:
+            return generalist.fly_all(self.configuration, self.evaluation)
+        from hyuav.experiments.comparison import stable_baselines  # an optional library
+
+        return stable_baselines.train(self.configuration, self.evaluation)
 
     def _keep(
         self, directory: Path, metrics: pd.DataFrame, sum_rates: list[float], earned: list[float]

@@ -3,20 +3,19 @@
 import copy
 import math
 import time
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
 import pandas as pd
 from torch import nn
 
+from hyuav.experiments.comparison.brought import Brought
 from hyuav.experiments.comparison.peer import ddpg_model
 from hyuav.experiments.comparison.plan import training_episodes
-from hyuav.experiments.evaluation import EvaluationParameters, fly
+from hyuav.experiments.evaluation import EvaluationParameters
 from hyuav.experiments.run_directory import RunConfiguration
-from hyuav.experiments.schemes import LEARNED
 from hyuav.learning.learners import Learner
 from hyuav.learning.policy import Policy
-from hyuav.physics.scenario import Scenario
 
 
 def train(
@@ -45,7 +44,7 @@ def train(
 
 def _train(
     configuration: RunConfiguration, learner: Learner, evaluation: EvaluationParameters
-) -> tuple[list[dict[str, Any]], "Brought"]:
+) -> tuple[list[dict[str, Any]], Brought]:
     started, scenario, training = (
         time.perf_counter(),
         configuration.scenario,
@@ -74,7 +73,7 @@ def _train(
         slots = episodes * scenario.num_slots
         model.learn(slots, reset_num_timesteps=False, log_interval=None)
         episode += episodes
-        brought = _flown(configuration, policy, training_episodes(training))
+        brought = Brought.by(policy, learner.scheme, configuration, training_episodes(training))
         if brought.reward > best:
             best, best_weights = brought.reward, copy.deepcopy(policy.state_dict())
         rows.append(
@@ -87,27 +86,4 @@ def _train(
             }
         )
     policy.load_state_dict(best_weights)
-    return rows, _flown(configuration, policy, evaluation)
-
-
-class Brought(NamedTuple):
-    """Means over episodes."""
-
-    sum_rate: float
-    """bps/Hz."""
-    earned: float
-    """By the reward."""
-    reward: float
-    """The same with penalties."""
-
-
-def _flown(
-    configuration: RunConfiguration, policy: Policy, episodes: EvaluationParameters
-) -> Brought:
-    """What an actor brings in these episodes."""
-    scenario: Scenario = policy.environment["scenario"]
-    scheme = LEARNED[policy.environment["scheme"]]
-    flights = fly(scenario, scheme, policy, episodes, reward=configuration.reward)
-    penalized = flights.earned - scenario.off_map_penalty * flights.totals["off_map"]
-    means = flights.totals["secrecy_sum_rate"], flights.earned, penalized
-    return Brought(*(float(each.mean()) for each in means))
+    return rows, Brought.by(policy, learner.scheme, configuration, evaluation)

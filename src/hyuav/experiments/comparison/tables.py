@@ -14,8 +14,8 @@ from hyuav._support.terminal import print_line, print_table, results_table
 from hyuav.experiments.comparison.statistics import NEAR_OPTIMAL
 from hyuav.experiments.comparison.summary import Summary
 from hyuav.experiments.metrics import finite_numbers
-from hyuav.experiments.schemes import LABELS, NO_HELPER
-from hyuav.learning.registry import PEER
+from hyuav.experiments.schemes import GENERALISTS, LABELS, NO_HELPER
+from hyuav.learning.registry import GENERALIST, PEER
 
 LABEL_WIDTH = 14
 """Of the column of the algorithms; longer names go on in the next line."""
@@ -26,8 +26,8 @@ MOST_COLUMNS = 5
 
 def label(entry: str) -> str:
     """An entry's name in tables and figures."""
-    if entry == PEER:
-        return "SB3 DDPG"
+    if entry in (names := {PEER: "SB3 DDPG", GENERALIST: LABELS[GENERALISTS["hybrid"]]}):
+        return names[entry]
     algorithm, _, piece = entry.partition("-")
     if piece:
         return f"without {piece.replace('_', ' ')}"

@@ -15,7 +15,7 @@ from hyuav.experiments.comparison.plan import LAYOUT, PIECES, Compare
 from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.experiments.comparison.statistics import performance_profiles
 from hyuav.experiments.run_directory import RunConfiguration, RunDirectory
-from hyuav.learning.registry import ALGORITHMS, PEER
+from hyuav.learning.registry import ALGORITHMS, GENERALIST, PEER
 from hyuav.viz.data.reading import readable_config, readable_table
 
 _OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
@@ -30,8 +30,8 @@ _CURVES = {"episode", "fraction"} | _IDENTITY
 
 def entry_color(entry: str) -> str:
     """An entry's color in every figure; a variant without a piece has that of the piece."""
-    if entry == PEER:
-        return OKABE_ITO["vermillion"]
+    if entry in (colors := {PEER: "vermillion", GENERALIST: "black"}):
+        return OKABE_ITO[colors[entry]]
     piece = entry.partition("-")[2]
     name, known = (piece, PIECES) if piece else (entry, tuple(ALGORITHMS))
     return OKABE_ITO[_OTHERS[known.index(name) % len(_OTHERS)]] if name in known else _UNKNOWN
