@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import gc
 import importlib.util
 import io
 import shutil
@@ -27,6 +28,7 @@ RECIPES = Path(__file__).parents[1] / "recipes"
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "__main__.py"
 
 torch.set_num_threads(1)
+gc.freeze()  # or each search for garbage would go through all libraries
 settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=True)
 settings.load_profile("hyuav")
 

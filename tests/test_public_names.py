@@ -2,12 +2,18 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 import hyuav
 
-HEAVY = ("torch", "torchrl", "pandas", "scipy", "matplotlib", "hydra", "wandb")
+RECIPES = Path(__file__).parents[1] / "recipes"
+
+HEAVY = (
+    *("torch", "torchrl", "pandas", "scipy", "matplotlib", "hydra", "wandb"),
+    *("plotly", "jinja2", "scipy.stats", "matplotlib.pyplot", "torch._inductor.compile_fx"),
+)
 
 
 @pytest.mark.parametrize("name", hyuav.__all__)
@@ -39,6 +45,11 @@ def loaded_by(program: str) -> list[str]:
 def test_neither_the_import_nor_the_help_loads_a_large_library() -> None:
     assert loaded_by("import hyuav; dir(hyuav)") == []
     assert loaded_by("from hyuav.cli import overview; print(overview())") == []
+
+
+def test_flying_the_generalist_loads_no_library_that_it_does_not_use() -> None:
+    fly = f"import runpy; runpy.run_path({str(RECIPES / 'fly.py')!r})"
+    assert loaded_by(fly) == ["torch", "torchrl", "pandas", "scipy", "matplotlib", "hydra"]
 
 
 @pytest.mark.parametrize(
