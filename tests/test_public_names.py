@@ -47,9 +47,12 @@ def test_neither_the_import_nor_the_help_loads_a_large_library() -> None:
     assert loaded_by("from hyuav.cli import overview; print(overview())") == []
 
 
-def test_flying_the_generalist_loads_no_library_that_it_does_not_use() -> None:
-    fly = f"import runpy; runpy.run_path({str(RECIPES / 'fly.py')!r})"
-    assert loaded_by(fly) == ["torch", "torchrl", "pandas", "scipy", "matplotlib", "hydra"]
+@pytest.mark.parametrize(
+    ("recipe", "used"), [("fly", ["scipy", "matplotlib"]), ("train", ["scipy", "plotly", "jinja2"])]
+)
+def test_a_recipe_loads_no_library_that_it_does_not_use(recipe: str, used: list[str]) -> None:
+    program = f"import runpy; runpy.run_path({str(RECIPES / f'{recipe}.py')!r})"
+    assert set(loaded_by(program)) == {"torch", "torchrl", "pandas", "hydra", *used}
 
 
 @pytest.mark.parametrize(
