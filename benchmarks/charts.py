@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLo
 
 from benchmarks.results import Results
 from benchmarks.tables import LABELS, VARIED, label
-from hyuav.envs.rendering import OKABE_ITO
+from hyuav.envs.appearance import OKABE_ITO
 from hyuav.viz.paper.style import COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
 
 COLORS = {

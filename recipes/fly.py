@@ -15,7 +15,14 @@ import torch
 from pydantic.dataclasses import dataclass
 from rich.console import Console
 
-from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNumber, parameter
+from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    Parameters,
+    PositiveNumber,
+    Threads,
+    parameter,
+)
 from hyuav._support.terminal import print_line
 from hyuav.experiments.configuration import Config, recipe, section
 from hyuav.experiments.evaluation_table import print_results
@@ -34,6 +41,7 @@ class Fly(Parameters):
     """Improve the flights by a local search with the exact model."""
     resolution: PositiveNumber | None = parameter(None, unit="m")
     """Of the optimum's grid; None for 4 m, or 10 m with several helpers. Finer ones take longer."""
+    threads: Threads = parameter(1)
 
 
 @recipe(
@@ -46,7 +54,7 @@ class Fly(Parameters):
 def main(config: Config, directory: Path) -> None:
     """Fly, print the table, draw the flights."""
     options, console = section(config, Fly), Console()
-    torch.set_num_threads(2)
+    torch.set_num_threads(options.threads)
     name, scenario = named_scenario(config["scenario"])
     evaluation = fly(
         scenario,

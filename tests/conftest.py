@@ -2,8 +2,10 @@
 
 import contextlib
 import dataclasses
+import gc
 import importlib.util
 import io
+import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator
@@ -27,6 +29,8 @@ RECIPES = Path(__file__).parents[1] / "recipes"
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "__main__.py"
 
 torch.set_num_threads(1)
+os.environ["OMP_NUM_THREADS"] = "1"  # of the processes that tests start
+gc.freeze()  # or each search for garbage would go through all libraries
 settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=True)
 settings.load_profile("hyuav")
 

@@ -2,12 +2,18 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 import hyuav
 
-HEAVY = ("torch", "torchrl", "pandas", "scipy", "matplotlib", "hydra", "wandb")
+RECIPES = Path(__file__).parents[1] / "recipes"
+
+HEAVY = (
+    *("torch", "torchrl", "pandas", "scipy", "matplotlib", "hydra", "wandb"),
+    *("plotly", "jinja2", "scipy.stats", "matplotlib.pyplot", "torch._inductor.compile_fx"),
+)
 
 
 @pytest.mark.parametrize("name", hyuav.__all__)
@@ -29,16 +35,38 @@ def test_a_name_that_is_not_public_is_refused() -> None:
         _ = hyuav.Scenari  # type: ignore[attr-defined]
 
 
-def loaded_by(program: str) -> list[str]:
-    """The libraries that a program has imported at its end."""
-    listed = f"{program}; import sys; print(*(own for own in {HEAVY} if own in sys.modules))"
-    ran = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True)
-    return ran.stdout.splitlines()[-1].split()
+USED = {"fly": {"matplotlib"}, "train": {"plotly", "jinja2"}}
+"""What recipes load besides what both need."""
+
+FORKED = f"""
+import os, sys
+for program in sys.argv[1:]:
+    if os.fork() == 0:
+        exec(program)
+        print("loaded:", *(own for own in {HEAVY} if own in sys.modules), flush=True)
+        os._exit(0)
+    os.wait()
+"""
+
+
+def loaded_by(*programs: str, begin: str = "") -> list[list[str]]:
+    """The libraries that each program has imported at its end, behind what all begin with."""
+    called = [sys.executable, "-c", f"{begin}\n{FORKED}", *programs]
+    ran = subprocess.run(called, capture_output=True, text=True, check=True)
+    told = (line.partition("loaded:") for line in ran.stdout.splitlines())
+    return [libraries.split() for _, mark, libraries in told if mark]
 
 
 def test_neither_the_import_nor_the_help_loads_a_large_library() -> None:
-    assert loaded_by("import hyuav; dir(hyuav)") == []
-    assert loaded_by("from hyuav.cli import overview; print(overview())") == []
+    asked = "from hyuav.cli import overview; print(overview())"
+    assert loaded_by("import hyuav; dir(hyuav)", asked) == [[], []]
+
+
+def test_a_recipe_loads_no_library_that_it_does_not_use() -> None:
+    programs = [f"import runpy; runpy.run_path({str(RECIPES / f'{own}.py')!r})" for own in USED]
+    both = {"torch", "torchrl", "pandas", "scipy", "hydra"}
+    loaded = loaded_by(*programs, begin="import hyuav.learning")
+    assert [set(own) for own in loaded] == [both | used for used in USED.values()]
 
 
 @pytest.mark.parametrize(

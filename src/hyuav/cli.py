@@ -117,10 +117,11 @@ def run(file: Path, name: str, arguments: list[str]) -> None:
         name: by which the command knows it.
         arguments: of the recipe.
     """
-    from hyuav._support import start  # from here on Ctrl-C ends in one line
+    import hyuav._support.start  # noqa: F401 - from here on Ctrl-C ends in one line
+    from hyuav._support import program
 
-    start.called = [_own_word(), name]
-    sys.argv = [" ".join(start.called), *arguments]
+    program.called[:] = [_own_word(), name]
+    sys.argv = [" ".join(program.called), *arguments]
     script = ModuleType("__main__")
     script.__file__ = str(file)
     sys.modules["__main__"] = script  # what a worker process runs first, under another name

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from hyuav import cli
-from hyuav._support import start
+from hyuav._support import program
 from recipe_calls import Call
 
 
@@ -18,7 +18,7 @@ def screen(
     capsys: pytest.CaptureFixture[str],
 ) -> tuple[str, str]:
     """A command and its help."""
-    monkeypatch.setattr(start, "called", ["hyuav", request.param])
+    monkeypatch.setattr(program, "called", ["hyuav", request.param])
     call(request.param, "--help")
     return f"hyuav {request.param}", capsys.readouterr().out
 
@@ -41,11 +41,11 @@ def test_its_examples_are_calls_of_the_command(screen: tuple[str, str]) -> None:
 def test_defaults_groups_and_sections_are_told(
     call: Call, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(start, "called", ["hyuav", "compare"])
+    monkeypatch.setattr(program, "called", ["hyuav", "compare"])
     call("compare", "-h", "learners=3")
     told = capsys.readouterr().out
     assert {"num_slots=[10,20]", "without=[]", "output=runs/TIME_compare"} <= set(told.split())
-    monkeypatch.setattr(start, "called", ["hyuav", "train"])
+    monkeypatch.setattr(program, "called", ["hyuav", "train"])
     call("train", "-h")
     told = capsys.readouterr().out
     members = "clusters, contested, disk, random_disk, random_layout, two_eavesdroppers"

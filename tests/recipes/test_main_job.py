@@ -15,6 +15,9 @@ from hyuav.viz.paper.gallery import FIGURES
 from offline_wandb import history, offline_runs, recorded
 from recipe_calls import FEW, TINY, Call, Refusal
 
+ENERGY = ("candidates=2", "candidate_episodes=3", "figures=[learning_curves,energy]")
+"""What two tests ask for, so that it is done once."""
+
 JOB = [
     *TINY,
     "candidates=1",
@@ -83,8 +86,8 @@ def test_all_of_a_job_is_one_group_and_its_parts_are_named_after_it(
     )
 
 
-def test_the_helpers_power_is_learned_beside_the_papers_schemes(call: Call, tmp_path: Path) -> None:
-    call("reproduce", "algorithm=ddpg", *JOB, "figures=energy", "power_episodes=2")
+def test_the_helpers_power_is_learned_beside_the_papers_schemes(once: Call, tmp_path: Path) -> None:
+    once("reproduce", "algorithm=ddpg", *JOB, *ENERGY, "power_episodes=2")
     with_power = RunDirectory(tmp_path / "job" / "with_power")
     configuration = with_power.configuration()
     assert configuration.scenario.power_control
@@ -101,6 +104,7 @@ def test_the_helpers_power_is_learned_beside_the_papers_schemes(call: Call, tmp_
 @pytest.mark.parametrize("terminal", [True, False])
 def test_a_terminal_shows_progress_of_all_that_takes_time_and_a_pipe_gets_none(
     call: Call,
+    once: Call,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     terminal: bool,
@@ -108,8 +112,8 @@ def test_a_terminal_shows_progress_of_all_that_takes_time_and_a_pipe_gets_none(
     if terminal:
         for name, value in (("TTY_COMPATIBLE", "1"), ("TTY_INTERACTIVE", "1"), ("COLUMNS", "100")):
             monkeypatch.setenv(name, value)
-    candidates = ("candidates=2", "candidate_episodes=3")
-    call("reproduce", "algorithm=ddpg", *JOB, *candidates, "figures=[learning_curves,energy]")
+    do = call if terminal else once
+    do("reproduce", "algorithm=ddpg", *JOB, *ENERGY, "power_episodes=2")
     written = capsys.readouterr().out
     told = re.sub(r"\x1b\[[\d;?]*\w", "", written)
     for task, total in (

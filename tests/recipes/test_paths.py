@@ -9,7 +9,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from hyuav import Scenario
-from hyuav._support import start
+from hyuav._support import program
 from hyuav.experiments import train as trainings
 from hyuav.experiments.quoting import in_quotes
 from hyuav.experiments.run_directory import RunDirectory
@@ -40,7 +40,7 @@ def interrupted(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(start, "called", [sys.executable, str(RECIPES / f"{recipe}.py")])
+    monkeypatch.setattr(program, "called", [sys.executable, str(RECIPES / f"{recipe}.py")])
     with monkeypatch.context() as patched:
         patched.setattr(trainings, "_train", interrupt)
         with pytest.raises(SystemExit) as stopped:

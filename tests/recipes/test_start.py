@@ -10,6 +10,8 @@ from pathlib import Path
 import psutil
 import pytest
 
+from hyuav._support.loading import SELDOM
+
 RECIPES = sorted((Path(__file__).parents[2] / "recipes").glob("*.py"))
 SOURCE = Path(__file__).parents[2] / "src"
 
@@ -113,12 +115,12 @@ def said_by(statements: str) -> list[str]:
     ("statements", "last"),
     [
         ("raise ValueError('no')", "ValueError: no"),
-        ("start.loaded(); signal.raise_signal(signal.SIGINT)", "KeyboardInterrupt"),
+        ("program.loaded(); signal.raise_signal(signal.SIGINT)", "KeyboardInterrupt"),
     ],
 )
 def test_what_is_no_mistake_of_the_user_keeps_its_traceback(statements: str, last: str) -> None:
     heed = "signal.signal(signal.SIGINT, signal.default_int_handler)"  # a shell may have it ignored
-    first, *_, told = said_by(f"{heed}; from hyuav._support import start; {statements}")
+    first, *_, told = said_by(f"{heed}; from hyuav._support import program, start; {statements}")
     assert first == "Traceback (most recent call last):"
     assert told == last
 
@@ -129,3 +131,13 @@ def test_a_signal_that_is_ignored_stays_so() -> None:
         said_by(f"{ignore}; from hyuav._support import start; signal.raise_signal(signal.SIGINT)")
         == []
     )
+
+
+def test_garbage_is_collected_as_ever_once_all_is_loaded() -> None:
+    ask = "print(gc.get_threshold(), gc.get_freeze_count() > 0, file=sys.stderr)"
+    begin = "from hyuav._support import program, start"
+    said = said_by(f"import gc, sys; {ask}; {begin}; {ask}; program.loaded(); {ask}")
+    before, loading, after = said
+    assert before.endswith("False")
+    assert loading == f"{SELDOM} False"
+    assert after == before.replace("False", "True")

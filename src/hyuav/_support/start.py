@@ -1,39 +1,23 @@
 """What a program imports before all else, so that it ends in one line while it is still loading.
 
-Loading takes seconds, in which nothing is done that would have to be kept. Until :func:`loaded`,
+Loading takes seconds, in which nothing is done that would have to be kept. What is loaded stays, so
+that it is seldom searched for garbage, which would take half as long again. Until :func:`.loaded`,
 Ctrl-C therefore ends the program at once, with status 130; in the worker of a program it does
 nothing, since the program ends its workers. An ``InputError`` that nobody answers ends it with
 status 2. A ``ScenarioWarning`` is one line without its place in the code.
 """
 
+import gc
 import multiprocessing
-import os
 import signal
 import sys
 import warnings
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import TextIO
 
 from hyuav._support.errors import InputError, ScenarioWarning
-
-called: list[str] = []
-"""The words of the command, such as ``hyuav train``; none where Python was given a file to run."""
-
-
-def program() -> list[str]:
-    """The words that call this program again; its arguments go behind them."""
-    return called or [sys.orig_argv[0], sys.argv[0]]
-
-
-def loaded() -> None:
-    """From now on Ctrl-C raises KeyboardInterrupt again."""
-    if signal.getsignal(signal.SIGINT) is _end:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def _end(number: int, _: FrameType | None) -> None:
-    os.write(2, b"interrupted\n")
-    os._exit(128 + number)  # an exception could be lost in what is being loaded
+from hyuav._support.loading import SELDOM
+from hyuav._support.program import end_at_once
 
 
 def _tell(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
@@ -58,8 +42,9 @@ def _warn(
     _show(message, category, filename, lineno, file, line)
 
 
+gc.set_threshold(*SELDOM)
 _show, warnings.showwarning = warnings.showwarning, _warn
 sys.excepthook = _tell
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored
     is_worker = multiprocessing.parent_process() is not None
-    signal.signal(signal.SIGINT, signal.SIG_IGN if is_worker else _end)
+    signal.signal(signal.SIGINT, signal.SIG_IGN if is_worker else end_at_once)

@@ -1,7 +1,5 @@
 """Maps of a scenario and of the flights over it, drawn with matplotlib."""
 
-from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 import matplotlib as mpl
@@ -18,29 +16,20 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from hyuav._support.errors import InputError, rejection
+from hyuav.envs.appearance import (
+    EAVESDROPPER_COLOR,
+    EAVESDROPPER_LABEL,
+    HELPER_COLOR,
+    HELPER_LABEL,
+    LEGITIMATE_COLOR,
+    LEGITIMATE_LABEL,
+    UE_COLOR,
+    runs_of_one_mode,
+)
 from hyuav.physics.channel import horizontal_distance
 from hyuav.physics.layout import Nodes
 from hyuav.physics.offloading import covered
 from hyuav.physics.scenario import Point, Scenario
-
-OKABE_ITO = {
-    "black": "#000000",
-    "orange": "#E69F00",
-    "sky blue": "#56B4E9",
-    "bluish green": "#009E73",
-    "yellow": "#F0E442",
-    "blue": "#0072B2",
-    "vermillion": "#D55E00",
-    "reddish purple": "#CC79A7",
-}
-"""Okabe and Ito's palette, which the colour-blind can tell apart."""
-
-LEGITIMATE_COLOR, EAVESDROPPER_COLOR = "#5A5A5A", "#222222"  # the palette is for schemes and modes
-HELPER_COLOR = OKABE_ITO["bluish green"]
-UE_COLOR = OKABE_ITO["black"]
-
-LEGITIMATE_LABEL, EAVESDROPPER_LABEL = "legitimate UAV (L)", "eavesdropper (E)"
-HELPER_LABEL = "helper UAV (H)"
 
 _FRAME_INCHES, _FRAME_DPI = (7.6, 5.2), 100  # even numbers of pixels, as video encoders want
 _FRAME_MAP, _FRAME_LEGEND = (0.13, 0.11, 0.55, 0.55 * 7.6 / 5.2), (0.69, 0.935)
@@ -259,11 +248,3 @@ def _slot_style(color: str, *, relay: bool) -> dict[str, Any]:
         "markerfacecolor": color if relay else "white",
         "zorder": 2.5,
     }
-
-
-def runs_of_one_mode(relays: NDArray[np.bool_]) -> Iterator[tuple[bool, int, int]]:
-    """Mode, first slot and end of each longest run, so that dashes go on over the slots."""
-    changes = np.flatnonzero(relays[1:] != relays[:-1]) + 1
-    bounds = [0, *changes.tolist(), len(relays)] if len(relays) else []
-    for first, last in pairwise(bounds):
-        yield bool(relays[first]), first, last

@@ -23,8 +23,8 @@ from omegaconf.errors import OmegaConfBaseException
 from hyuav._support.errors import Halted, InputError, Interrupted, cause, harmless, one_line
 from hyuav._support.interruption import interrupted_by_sigterm
 from hyuav._support.parameters import Parameters, mapping
+from hyuav._support.program import loaded, program
 from hyuav._support.registry import file_name
-from hyuav._support.start import loaded, program
 from hyuav.experiments.command_line import remember
 from hyuav.experiments.configuration_files import read_files_as_data
 from hyuav.experiments.elsewhere import AS_TRAINED, as_trained
@@ -122,6 +122,7 @@ def recipe(
                 offered = {group: (member, members_of(group)) for group, member in groups.items()}
                 logged = {LOGGER: LoggerParameters.defaults()} if LOGGER in groups else {}
                 fields, names_of = {**node, **logged}, [*sections, *logged]
+                loaded()
                 told = usage(name, function.__globals__["__doc__"], fields, offered, names_of)
                 sys.stdout.write(f"{told}\n")  # at once, as what is piped to may end early
                 return

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
+import scipy  # whose parts are loaded where they are first used
 from numpy.typing import NDArray
-from scipy import stats
 
 Array = NDArray[np.float64]
 Statistic = Callable[[Sequence[Array]], Any]
@@ -23,7 +23,7 @@ SEED = 0
 
 def interquartile_mean(samples: Sequence[Array]) -> Any:
     """Mean of the middle half of all samples together."""
-    return stats.trim_mean(np.concatenate(samples, axis=-1), 0.25, axis=-1)
+    return scipy.stats.trim_mean(np.concatenate(samples, axis=-1), 0.25, axis=-1)
 
 
 def stratified_interval(samples: Sequence[Array], statistic: Statistic) -> tuple[Any, Any]:
@@ -43,7 +43,7 @@ def stratified_interval(samples: Sequence[Array], statistic: Statistic) -> tuple
     def of_drawn(*drawn: Array, axis: int) -> Any:  # noqa: ARG001 - SciPy's last one
         return statistic([own[..., :size] for own, size in zip(drawn, sizes, strict=True)])
 
-    interval = stats.bootstrap(
+    interval = scipy.stats.bootstrap(
         given,
         of_drawn,
         axis=-1,

@@ -8,7 +8,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from hyuav._support.start import program
+from hyuav._support.program import program
 
 WIDTH = 80
 

@@ -2,10 +2,7 @@
 
 import os
 import signal
-from collections.abc import Callable
 from pathlib import Path
-
-import pytest
 
 from hyuav._support.errors import InputError
 from hyuav._support.interruption import Interruption
@@ -55,14 +52,13 @@ def stop_at_first(file: Path) -> None:
             interruption.raise_if_requested("so far")
 
 
-@pytest.mark.parametrize(
-    ("piece", "name"),
-    [(fall_at_first, "SIGKILL"), (fall_at_first, "SIGTERM"), (stop_at_first, "SIGTERM")],
-)
-def test_a_piece_whose_process_is_killed_is_begun_again(
-    tmp_path: Path, piece: Callable[[Path], None], name: str
-) -> None:
+def test_a_piece_whose_process_is_killed_is_begun_again(tmp_path: Path) -> None:
+    falling = [tmp_path / name for name in ("SIGKILL", "SIGTERM")]
+    stopping = tmp_path / "of another" / "SIGTERM"
+    stopping.parent.mkdir()
     with Workers(2, retries=1) as workers:
-        assert list(workers.attempt_all(piece, [tmp_path / name])) == [(tmp_path / name, None)]
+        assert dict(workers.attempt_all(fall_at_first, falling)) == dict.fromkeys(falling)
+        assert list(workers.attempt_all(stop_at_first, [stopping])) == [(stopping, None)]
+        assert all(file.exists() for file in (*falling, stopping))
         reasons = dict(workers.attempt_all(divide, [7, 1]))
     assert reasons == {7: "its process was killed, 2 times", 1: None}

@@ -14,6 +14,7 @@ from typing import Self, TypeVar
 import torch
 
 from hyuav._support.errors import InputError
+from hyuav._support.loading import collect_as_ever
 
 Piece = TypeVar("Piece")
 
@@ -92,6 +93,7 @@ def _begin() -> None:
     # TorchRL's replay has locks. Those of "spawn" have names, which are left if it is killed.
     if "fork" in multiprocessing.get_all_start_methods():
         multiprocessing.set_start_method("fork", force=True)
+    collect_as_ever()  # its program has been loaded, as that of the first process
     settle()
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from hyuav._support.errors import InputError, rejection
 from hyuav._support.formatting import in_words
 from hyuav._support.parameters import OneOf, declared
-from hyuav.envs.rendering import EAVESDROPPER_LABEL, LEGITIMATE_LABEL
+from hyuav.envs.appearance import EAVESDROPPER_LABEL, LEGITIMATE_LABEL
 from hyuav.experiments.scenarios import NAMES
 from hyuav.physics.scenario import Point, Scenario
 

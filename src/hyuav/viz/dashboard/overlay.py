@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from hyuav.envs.rendering import HELPER_COLOR, runs_of_one_mode
+from hyuav.envs.appearance import HELPER_COLOR, runs_of_one_mode
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import Flight, first_flights, flying_schemes
 from hyuav.viz.data.maps import RULE_MODES, helper_map

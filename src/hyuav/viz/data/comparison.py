@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from hyuav._support.errors import InputError
-from hyuav.envs.rendering import OKABE_ITO
+from hyuav.envs.appearance import OKABE_ITO
 from hyuav.experiments.comparison.plan import LAYOUT, PIECES, Compare
 from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.experiments.comparison.statistics import performance_profiles

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from hyuav.envs.rendering import OKABE_ITO
+from hyuav.envs.appearance import OKABE_ITO
 from hyuav.experiments.schemes import (
     LABELS,
     NO_HELPER,

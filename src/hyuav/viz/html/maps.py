@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from hyuav.envs.rendering import (
+from hyuav.envs.appearance import (
     EAVESDROPPER_COLOR,
     EAVESDROPPER_LABEL,
     LEGITIMATE_COLOR,

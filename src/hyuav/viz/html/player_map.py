@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hyuav.envs.rendering import (
+from hyuav.envs.appearance import (
     EAVESDROPPER_COLOR,
     EAVESDROPPER_LABEL,
     HELPER_LABEL,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hyuav.envs.rendering import LEGITIMATE_COLOR, OKABE_ITO
+from hyuav.envs.appearance import LEGITIMATE_COLOR, OKABE_ITO
 from hyuav.physics.scenario import Scenario
 from hyuav.viz.data.flights import Flight, budgets, names
 from hyuav.viz.html.player_map import Trace, trace

@@ -15,8 +15,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from hyuav._support.files import write_durably
+from hyuav.envs.appearance import UE_COLOR
 from hyuav.envs.rendering import (
-    UE_COLOR,
     draw_coverage,
     draw_flight,
     draw_scenario,

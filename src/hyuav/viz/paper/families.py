@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from hyuav.envs.rendering import OKABE_ITO
+from hyuav.envs.appearance import OKABE_ITO
 from hyuav.experiments.schemes import GENERALISTS
 from hyuav.viz.data.schemes import scheme_color
 from hyuav.viz.paper.style import PAGE_WIDTH, STYLE, legend_below

@@ -13,7 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from hyuav.envs.rendering import LEGITIMATE_COLOR, draw_flight, draw_scenario, mode_handles
+from hyuav.envs.appearance import LEGITIMATE_COLOR
+from hyuav.envs.rendering import draw_flight, draw_scenario, mode_handles
 from hyuav.experiments.schemes import LABELS, OPTIMUM_POWER, PROPOSED_POWER
 from hyuav.physics.scenario import Point, Scenario
 from hyuav.viz.data.flights import Flight, first_flights, flight_tables

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from hyuav._support.files import write_durably
-from hyuav.envs.rendering import OKABE_ITO
+from hyuav.envs.appearance import OKABE_ITO
 from hyuav.viz.data.schemes import Line
 
 COLUMN_WIDTH, PAGE_WIDTH = 3.5, 7.16
