@@ -88,6 +88,10 @@ class SeveralHelpers:
         """A flight on the helpers' grids, improved in so many turns at most."""
         return self._improved(self._expected, mode_rule, plan, turns)
 
+    def earned(self, mode_rule: str, plan: Plan) -> float:
+        """What a flight is expected to bring in bps/Hz."""
+        return self._earned(self._expected, mode_rule, plan)
+
     def _earned(self, expected: ExpectedReward, mode_rule: str, plan: Plan) -> float:
         return float(expected([mode_rule], plan[0][1:], plan[1]).sum())
 
@@ -100,7 +104,7 @@ class SeveralHelpers:
         jamming, relay = jamming_destinations(scenario), relay_destination(scenario)
         for jammers in range(scenario.num_helpers + 1):
             ends = [*jamming[:jammers], *[relay] * (scenario.num_helpers - jammers)]
-            path = _straight(self._physics, ends, num_slots)
+            path = straight_path(self._physics, ends, num_slots)
             yield path, path.new_ones(num_slots, scenario.num_helpers)
 
     def _joint_plan(self, mode_rule: str, num_slots: int) -> Plan:
@@ -198,7 +202,7 @@ class SeveralHelpers:
         return path, power
 
 
-def _straight(physics: Physics, destinations: Sequence[Point], num_slots: int) -> Tensor:
+def straight_path(physics: Physics, destinations: Sequence[Point], num_slots: int) -> Tensor:
     """Straight flights, as fast as half the speed limit, and then hovering: (T + 1, H, 2) m."""
     scenario, starts = physics.scenario, physics.nodes.helper
     way = starts.new_tensor(destinations) - starts

@@ -8,21 +8,24 @@ from torch import Tensor
 from hyuav.learning.generalist.scene import Others
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
-from hyuav.references.joint import SeveralHelpers
+from hyuav.references.joint import SeveralHelpers, straight_path
 
 
 class Coarseness(NamedTuple):
-    """How roughly flights are found."""
+    """How roughly flights are found: first anywhere, then nearby."""
 
     spacing: float
-    """Of the grid in m; who is led by such a flight stays as near to it."""
+    """Of the grid in m on which they are found anywhere; who is led by such a flight stays as near
+    to it."""
+    near: float
+    """Of that on which they are then made better in m, at most ``spacing`` away."""
     draws: int
     """Of a slot's fading, over which what it brings is averaged; 1 leaves it out."""
     turns_of_each: int
     """How often each helper's flight is improved at most, with the others' held."""
 
 
-OF_ONE, OF_SEVERAL = Coarseness(4.0, 32, 1), Coarseness(20.0, 1, 2)
+OF_ONE, OF_SEVERAL = Coarseness(4.0, 4.0, 32, 1), Coarseness(20.0, 5.0, 1, 2)
 """For one helper, and for several."""
 
 POWER_STEP = 15.0
@@ -44,14 +47,28 @@ class Plan(NamedTuple):
 
     @classmethod
     def roughly_best(cls, scenario: Scenario, mode_rule: str) -> Self:
-        """The best flight on a coarse grid that is found."""
+        """The best rough flight that is found.
+
+        Of two helpers each may have the other's role: on a coarse grid both ways are about as good.
+        """
         physics = Physics(scenario, dtype=torch.float64, layout_is_known=False)
         rough = coarseness(scenario)
-        several = SeveralHelpers(
-            physics, rough.spacing, POWER_STEP, rough.draws, seed=0, window=scenario.map_side
+        anywhere, nearby = (
+            SeveralHelpers(physics, spacing, POWER_STEP, rough.draws, seed=0, window=window)
+            for spacing, window in (
+                (rough.spacing, scenario.map_side),
+                (rough.near, rough.spacing),
+            )
         )
         turns = rough.turns_of_each * scenario.num_helpers
-        path, share = several.best(mode_rule, scenario.num_slots, turns)
+        plans = [anywhere.best(mode_rule, scenario.num_slots, turns)]
+        if scenario.num_helpers == 2:
+            path, share = plans[0]
+            exchanged = straight_path(physics, path[-1].flip(0).tolist(), scenario.num_slots)
+            plans.append(anywhere.improved(mode_rule, (exchanged, share.flip(1)), turns))
+        if scenario.num_helpers > 1:
+            plans = [nearby.improved(mode_rule, plan, turns) for plan in plans]
+        path, share = max(plans, key=lambda plan: nearby.earned(mode_rule, plan))
         return cls(path.float(), share.float())
 
     @property

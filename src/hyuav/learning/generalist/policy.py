@@ -75,9 +75,9 @@ class GeneralistPolicy(TensorDictModuleBase):
         scenes = scenes_of(scenario, mode_rule, draws, self._rough.at_the_end)
         self.world = World(scenes, Tokens.of([scenario] * scenes.count))
         physics = Physics(scenario, dtype=torch.float32)
-        self._few_draws, self._expected = (
+        self._few_draws, self._expected, self._judging = (
             ExpectedReward(physics, count, torch.Generator().manual_seed(0))
-            for count in (ROUGH_DRAWS, DRAWS_OF_SEVERAL if self._several else 4 * DRAWS)
+            for count in (ROUGH_DRAWS, DRAWS_OF_SEVERAL, 4 * DRAWS)
         )
         self._seen, self._flight = self._best_flight()
 
@@ -89,11 +89,11 @@ class GeneralistPolicy(TensorDictModuleBase):
         ways = Seen(turns.repeat_interleave(len(windows), dim=0), windows.repeat(len(turns)))
         path, share = self._flown(ways)
         everywhere = path[1:].transpose(0, 1), share.transpose(0, 1)
-        slots = self._expected([self.mode_rule], *(each.flatten(0, 1) for each in everywhere))
+        slots = self._judging([self.mode_rule], *(each.flatten(0, 1) for each in everywhere))
         earned = slots.reshape(len(ways.turn), -1).sum(dim=-1)
         best = int(earned.argmax())
         flight = Plan(path[:, best], share[:, best])
-        rough = self._expected([self.mode_rule], self._rough.path[1:], self._rough.share).sum()
+        rough = self._judging([self.mode_rule], self._rough.path[1:], self._rough.share).sum()
         if float(rough) > float(earned[best]):
             flight = self._rough
         return Seen(*(each[best : best + 1] for each in ways)), flight
