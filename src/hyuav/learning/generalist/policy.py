@@ -88,14 +88,9 @@ class GeneralistPolicy(TensorDictModuleBase):
         windows = torch.tensor([coarseness(self.scenario).spacing, torch.inf])
         ways = Seen(turns.repeat_interleave(len(windows), dim=0), windows.repeat(len(turns)))
         path, share = self._flown(ways)
-        everywhere = path[1:].transpose(0, 1), share.transpose(0, 1)
-        slots = self._judging([self.mode_rule], *(each.flatten(0, 1) for each in everywhere))
-        earned = slots.reshape(len(ways.turn), -1).sum(dim=-1)
-        best = int(earned.argmax())
-        flight = Plan(path[:, best], share[:, best])
-        rough = self._judging([self.mode_rule], self._rough.path[1:], self._rough.share).sum()
-        if float(rough) > float(earned[best]):
-            flight = self._rough
+        plans = [Plan(path[:, way], share[:, way]) for way in range(len(ways.turn))]
+        best = max(range(len(plans)), key=lambda way: self.expected(plans[way]))
+        flight = max(self._rough, plans[best], key=self.expected)
         return Seen(*(each[best : best + 1] for each in ways)), flight
 
     @torch.no_grad()
@@ -110,6 +105,11 @@ class GeneralistPolicy(TensorDictModuleBase):
         action = self._act(places, states[:, -1].long().cpu())
         action = action.flatten(-2).to(position)[own]
         return tensordict.set("action", action.reshape(*position.shape[:-2], -1))
+
+    def expected(self, plan: Plan) -> float:
+        """What a flight is expected to bring in bps/Hz."""
+        path, share = (each.float() for each in plan)
+        return float(self._judging([self.mode_rule], path[1:], share).sum())
 
     def plan(self) -> Plan:
         """The flight from the start."""

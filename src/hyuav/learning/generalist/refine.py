@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import torch
 
+from hyuav.learning.generalist.plans import Plan
 from hyuav.learning.generalist.policy import GeneralistPolicy
 from hyuav.physics.slot import Physics
 from hyuav.references.flight import FlightPolicy, flyable
@@ -38,11 +39,13 @@ def refined(policy: GeneralistPolicy) -> FlightPolicy:
     """The flight of a policy, improved by dynamic programming in tubes around it."""
     scenario = policy.scenario
     physics = Physics(scenario, dtype=torch.float64)
-    path, share = policy.plan()
+    plans = [policy.plan()]
     for search in OF_ONE if scenario.num_helpers == 1 else OF_SEVERAL:
         improving = SeveralHelpers(
             physics, search.resolution, search.power_step, search.draws, 0, search.window
         )
         turns = search.rounds * scenario.num_helpers
-        path, share = improving.improved(policy.mode_rule, (path, share), turns)
+        plans.append(Plan(*improving.improved(policy.mode_rule, plans[-1], turns)))
+    # By few draws a search may prefer what is worse.
+    path, share = max(plans, key=policy.expected)
     return FlightPolicy(flyable(path, physics, policy.mode_rule), scenario, share)
