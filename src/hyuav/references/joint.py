@@ -97,14 +97,18 @@ class SeveralHelpers:
 
     def _beginnings(self, mode_rule: str, num_slots: int) -> Iterator[Plan]:
         """Flights to begin with."""
-        scenario = self._physics.scenario
-        if scenario.num_helpers == 2:
+        if self._physics.scenario.num_helpers == 2:
             yield self._joint_plan(mode_rule, num_slots)
-            return
+        else:
+            yield from self.straight(num_slots)
+
+    def straight(self, num_slots: int) -> Iterator[Plan]:
+        """Straight flights of some helpers to where they jam best, of the others to relay."""
+        scenario = self._physics.scenario
         jamming, relay = jamming_destinations(scenario), relay_destination(scenario)
         for jammers in range(scenario.num_helpers + 1):
             ends = [*jamming[:jammers], *[relay] * (scenario.num_helpers - jammers)]
-            path = straight_path(self._physics, ends, num_slots)
+            path = _straight(self._physics, ends, num_slots)
             yield path, path.new_ones(num_slots, scenario.num_helpers)
 
     def _joint_plan(self, mode_rule: str, num_slots: int) -> Plan:
@@ -202,7 +206,7 @@ class SeveralHelpers:
         return path, power
 
 
-def straight_path(physics: Physics, destinations: Sequence[Point], num_slots: int) -> Tensor:
+def _straight(physics: Physics, destinations: Sequence[Point], num_slots: int) -> Tensor:
     """Straight flights, as fast as half the speed limit, and then hovering: (T + 1, H, 2) m."""
     scenario, starts = physics.scenario, physics.nodes.helper
     way = starts.new_tensor(destinations) - starts

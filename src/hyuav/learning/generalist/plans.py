@@ -8,7 +8,7 @@ from torch import Tensor
 from hyuav.learning.generalist.scene import Others
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
-from hyuav.references.joint import SeveralHelpers, straight_path
+from hyuav.references.joint import SeveralHelpers
 
 
 class Coarseness(NamedTuple):
@@ -47,10 +47,7 @@ class Plan(NamedTuple):
 
     @classmethod
     def roughly_best(cls, scenario: Scenario, mode_rule: str) -> Self:
-        """The best rough flight that is found.
-
-        Of two helpers each may have the other's role: on a coarse grid both ways are about as good.
-        """
+        """The best rough flight that is found."""
         physics = Physics(scenario, dtype=torch.float64, layout_is_known=False)
         rough = coarseness(scenario)
         anywhere, nearby = (
@@ -62,11 +59,9 @@ class Plan(NamedTuple):
         )
         turns = rough.turns_of_each * scenario.num_helpers
         plans = [anywhere.best(mode_rule, scenario.num_slots, turns)]
-        if scenario.num_helpers == 2:
-            path, share = plans[0]
-            exchanged = straight_path(physics, path[-1].flip(0).tolist(), scenario.num_slots)
-            plans.append(anywhere.improved(mode_rule, (exchanged, share.flip(1)), turns))
         if scenario.num_helpers > 1:
+            # Right above an eavesdropper a helper jams best, which a coarse grid may miss.
+            plans += anywhere.straight(scenario.num_slots)
             plans = [nearby.improved(mode_rule, plan, turns) for plan in plans]
         path, share = max(plans, key=lambda plan: nearby.earned(mode_rule, plan))
         return cls(path.float(), share.float())
