@@ -134,11 +134,11 @@ def test_it_is_told_once_however_the_scenario_is_flown(call: Callable[[], Any]) 
     assert not told(call)
 
 
-def test_a_program_shows_it_as_one_line_on_standard_error() -> None:
+def test_a_command_shows_it_as_one_line_on_standard_error() -> None:
     program = (
         "from hyuav import Scenario, make_env;"
         "one = Scenario(ue_positions=((0.0, 10.0),));"
-        "import hyuav.experiments.configuration;"
+        "import hyuav._support.start;"
         "make_env(one); make_env(one, batch_size=2)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
