@@ -22,7 +22,8 @@ class Coarseness(NamedTuple):
     draws: int
     """Of a slot's fading, over which what it brings is averaged; 1 leaves it out."""
     turns_of_each: int
-    """How often each helper's flight is improved at most, with the others' held."""
+    """How often each helper's flight is improved at most, with the others' held; nearby three times
+    as often, as powers that are too high fall in turn."""
 
 
 OF_ONE, OF_SEVERAL = Coarseness(4.0, 4.0, 32, 1), Coarseness(20.0, 5.0, 1, 2)
@@ -62,7 +63,7 @@ class Plan(NamedTuple):
         if scenario.num_helpers > 1:
             # Right above an eavesdropper a helper jams best, which a coarse grid may miss.
             plans += anywhere.straight(scenario.num_slots)
-            plans = [nearby.improved(mode_rule, plan, turns) for plan in plans]
+            plans = [nearby.improved(mode_rule, plan, 3 * turns) for plan in plans]
         path, share = max(plans, key=lambda plan: nearby.earned(mode_rule, plan))
         return cls(path.float(), share.float())
 
