@@ -9,7 +9,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from hyuav._support.errors import InputError, InputTypeError, rejection
-from hyuav.physics.scenario import ScenarioLike, as_scenario
+from hyuav.physics.scenario import Scenario, ScenarioLike, as_scenario
 from hyuav.physics.slot import Physics
 
 
@@ -62,22 +62,35 @@ class FlightPolicy(TensorDictModuleBase):
         if path.ndim != 3 or path.shape[1:] != (scenario.num_helpers, 2) or not len(path):
             raise InputError(rejection("path", tuple(path.shape), accepted))
         self.register_buffer("path", path.to(torch.float64))
-        self.step_length = scenario.max_speed * scenario.slot_duration
-        self.register_buffer("power", None)
-        if scenario.power_control:
-            share = torch.ones_like(path[1:, :, 0]) if power is None else power
-            decibels = 10.0 * share.to(torch.float64).log10()
-            self.power = (1.0 + 2.0 * decibels / scenario.power_range).unsqueeze(-1)
+        nominal = torch.ones(max(len(path) - 1, 1), scenario.num_helpers)
+        share = nominal if power is None else power
+        self.register_buffer("power", share.to(torch.float64))
+        self.scenario = scenario
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the actions of each flight in the batch."""
         path = self.get_buffer("path")
         slot = (tensordict["step_count"].squeeze(-1) + 1).clamp(max=len(path) - 1)
-        position = tensordict["position"]
-        action = (path[slot] - position) / self.step_length
-        if self.power is not None:
-            action = torch.cat([action, self.power[slot - 1]], dim=-1)
-        return tensordict.set("action", action.flatten(-2).clamp(-1.0, 1.0).to(position.dtype))
+        position, power = tensordict["position"], self.get_buffer("power")
+        action = towards(self.scenario, position, path[slot], power[slot - 1])
+        return tensordict.set("action", action.flatten(-2).to(position.dtype))
+
+
+def towards(scenario: Scenario, position: Tensor, target: Tensor, power: Tensor) -> Tensor:
+    """The actions (..., H, 2) that lead helpers to places, or (..., H, 3) that tell powers too.
+
+    Args:
+        scenario: whether its power is controlled, how far down, and how far a slot's flight leads.
+        position: (..., H, 2) m, where they are.
+        target: (..., H, 2) m, where they are to be after the slot.
+        power: (..., H), in units of the nominal power.
+    """
+    action = (target - position) / (scenario.max_speed * scenario.slot_duration)
+    if scenario.power_control:
+        decibels = 10.0 * power.log10()
+        told = (1.0 + 2.0 * decibels / scenario.power_range).unsqueeze(-1)
+        action = torch.cat([action, told], dim=-1)
+    return action.clamp(-1.0, 1.0)
 
 
 def flyable(path: Tensor, physics: Physics, mode_rule: str) -> Tensor:

@@ -20,14 +20,17 @@ from hyuav.learning.registry import GENERALIST, PEER
 LABEL_WIDTH = 14
 """Of the column of the algorithms; longer names go on in the next line."""
 
+BESIDE_LABELS = {PEER: "SB3 DDPG", GENERALIST: LABELS[GENERALISTS["hybrid"]]}
+"""Of what is compared and no algorithm of this project."""
+
 MOST_COLUMNS = 5
 """Of a table of pairs; where there are more algorithms, each is set beside the first alone."""
 
 
 def label(entry: str) -> str:
     """An entry's name in tables and figures."""
-    if entry in (names := {PEER: "SB3 DDPG", GENERALIST: LABELS[GENERALISTS["hybrid"]]}):
-        return names[entry]
+    if entry in BESIDE_LABELS:
+        return BESIDE_LABELS[entry]
     algorithm, _, piece = entry.partition("-")
     if piece:
         return f"without {piece.replace('_', ' ')}"

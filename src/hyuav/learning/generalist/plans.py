@@ -12,22 +12,23 @@ from hyuav.references.joint import SeveralHelpers
 
 
 class Coarseness(NamedTuple):
-    """How roughly flights are found: first anywhere, then nearby."""
+    """How roughly flights are found anywhere on the map."""
 
     spacing: float
-    """Of the grid in m on which they are found anywhere; who is led by such a flight stays as near
-    to it."""
-    near: float
-    """Of that on which they are then made better in m, at most ``spacing`` away."""
+    """Of the grid in m; who is led by such a flight stays as near to it."""
     draws: int
     """Of a slot's fading, over which what it brings is averaged; 1 leaves it out."""
-    turns_of_each: int
-    """How often each helper's flight is improved at most, with the others' held; nearby three times
-    as often, as powers that are too high fall in turn."""
 
 
-OF_ONE, OF_SEVERAL = Coarseness(4.0, 4.0, 32, 1), Coarseness(20.0, 5.0, 1, 2)
+OF_ONE, OF_SEVERAL = Coarseness(4.0, 32), Coarseness(20.0, 1)
 """For one helper, and for several."""
+
+NEAR = 5.0
+"""Of the grid in m on which flights of several helpers are made better nearby."""
+
+TURNS_OF_EACH, TURNS_NEARBY = 2, 6
+"""How often each of several helpers' flights is improved at most, with the others' held: anywhere,
+and nearby, where powers that are too high fall in turn."""
 
 POWER_STEP = 15.0
 """Between the levels of power that are tried, in dB."""
@@ -50,20 +51,20 @@ class Plan(NamedTuple):
     def roughly_best(cls, scenario: Scenario, mode_rule: str) -> Self:
         """The best rough flight that is found."""
         physics = Physics(scenario, dtype=torch.float64, layout_is_known=False)
-        rough = coarseness(scenario)
-        anywhere, nearby = (
-            SeveralHelpers(physics, spacing, POWER_STEP, rough.draws, seed=0, window=window)
-            for spacing, window in (
-                (rough.spacing, scenario.map_side),
-                (rough.near, rough.spacing),
-            )
+        spacing, draws = coarseness(scenario)
+        anywhere = SeveralHelpers(
+            physics, spacing, POWER_STEP, draws, seed=0, window=scenario.map_side
         )
-        turns = rough.turns_of_each * scenario.num_helpers
-        plans = [anywhere.best(mode_rule, scenario.num_slots, turns)]
-        if scenario.num_helpers > 1:
-            # Right above an eavesdropper a helper jams best, which a coarse grid may miss.
-            plans += anywhere.straight(scenario.num_slots)
-            plans = [nearby.improved(mode_rule, plan, 3 * turns) for plan in plans]
+        straight = list(anywhere.straight(scenario.num_slots))
+        if scenario.num_helpers == 1:  # whose program does not depend on where it begins
+            path, share = anywhere.improved(mode_rule, straight[0], turns=1)
+            return cls(path.float(), share.float())
+        turns = TURNS_OF_EACH * scenario.num_helpers
+        found = anywhere.best(mode_rule, scenario.num_slots, turns)
+        nearby = SeveralHelpers(physics, NEAR, POWER_STEP, draws, seed=0, window=spacing)
+        turns = TURNS_NEARBY * scenario.num_helpers
+        # Right above an eavesdropper a helper jams best, which a coarse grid may miss.
+        plans = [nearby.improved(mode_rule, plan, turns) for plan in (found, *straight)]
         path, share = max(plans, key=lambda plan: nearby.earned(mode_rule, plan))
         return cls(path.float(), share.float())
 

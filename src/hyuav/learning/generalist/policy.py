@@ -21,6 +21,7 @@ from hyuav.learning.generalist.scene import (
 from hyuav.learning.generalist.tokens import Tokens
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
+from hyuav.references.flight import towards
 from hyuav.references.power import best_levels
 from hyuav.references.rewards import ExpectedReward
 
@@ -89,8 +90,9 @@ class GeneralistPolicy(TensorDictModuleBase):
         ways = Seen(turns.repeat_interleave(len(windows), dim=0), windows.repeat(len(turns)))
         path, share = self._flown(ways)
         plans = [Plan(path[:, way], share[:, way]) for way in range(len(ways.turn))]
-        best = max(range(len(plans)), key=lambda way: self.expected(plans[way]))
-        flight = max(self._rough, plans[best], key=self.expected)
+        earned = [self.expected(plan) for plan in plans]
+        best = earned.index(max(earned))
+        flight = self._rough if self.expected(self._rough) >= earned[best] else plans[best]
         return Seen(*(each[best : best + 1] for each in ways)), flight
 
     @torch.no_grad()
@@ -135,7 +137,7 @@ class GeneralistPolicy(TensorDictModuleBase):
         if bool(off.any()):
             seen = Seen(*(each.expand(int(off.sum()), *each.shape[1:]) for each in self._seen))
             target[off], power[off] = self._decided(position[off], slot[off], seen)
-        return self._action(position, target, power)
+        return towards(self.scenario, position, target, power)
 
     def _decided(self, position: Tensor, slot: Tensor, seen: Seen) -> tuple[Tensor, Tensor]:
         """Where helpers (B, H, 2) m fly in a slot (B,), and their powers (B, H)."""
@@ -158,15 +160,6 @@ class GeneralistPolicy(TensorDictModuleBase):
             share[:, helper] = shares.gather(1, chosen).squeeze(-1)
             target[:, helper] = candidates.gather(1, chosen.unsqueeze(-1).expand(-1, -1, 2))[:, 0]
         return target, share
-
-    def _action(self, position: Tensor, target: Tensor, share: Tensor) -> Tensor:
-        """The actions that lead to places, at powers."""
-        scenario = self.scenario
-        action = (target - position) / (scenario.max_speed * scenario.slot_duration)
-        if scenario.power_control:
-            power = 1.0 + 20.0 * share.log10() / scenario.power_range
-            action = torch.cat([action, power.unsqueeze(-1)], dim=-1)
-        return action.clamp(-1.0, 1.0)
 
     def _worth(
         self, choice: Choice, candidates: Tensor, helper: int, others: Tensor, share: Tensor

@@ -58,9 +58,9 @@ TURNS = tuple(
 """The symmetries of the map: four turns, and the same behind a mirror."""
 
 
-def offsets(spacing: int, count: int, device: torch.device | str = "cpu") -> Tensor:
+def offsets(spacing: int, count: int) -> Tensor:
     """A square of places around a helper, in spacings of the lattice: (count^2, 2)."""
-    axis = (torch.arange(count, device=device) - count // 2) * spacing
+    axis = (torch.arange(count) - count // 2) * spacing
     return torch.cartesian_prod(axis, axis)
 
 
@@ -199,8 +199,8 @@ def _scene_of_one(
     own = grid.positions().to(physics.dtype)
     places, power = (each.expand(len(own), *each.shape).clone() for each in others)
     places[:, helper] = own
-    step = POWER_STEP if scenario.num_helpers == 1 else ROUGH_STEP
-    rewards, shares = best_levels(expected, rough, [mode_rule], places, power, helper, step)
+    power_step = POWER_STEP if scenario.num_helpers == 1 else ROUGH_STEP
+    rewards, shares = best_levels(expected, rough, [mode_rule], places, power, helper, power_step)
     best = float(rewards.max())
     side = int(scenario.map_side / spacing * (1 + 1e-9)) + 1
     normalized = _square(rewards.reshape(grid.shape) / max(best, 1e-9), side, OUTSIDE)

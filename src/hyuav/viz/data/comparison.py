@@ -20,8 +20,8 @@ from hyuav.viz.data.reading import readable_config, readable_table
 
 _OTHERS = ("bluish green", "blue", "orange", "reddish purple", "sky blue", "yellow", "black")
 
-_AT_ONCE = "#b0b0b0"
-"""Of the generalist, which does not learn."""
+_BESIDE = {PEER: OKABE_ITO["vermillion"], GENERALIST: "#b0b0b0"}
+"""Of what is compared and no algorithm of this project."""
 
 _UNKNOWN = "#777777"
 """Of an algorithm or a piece that is not offered now: another user's own, an earlier version's."""
@@ -33,8 +33,8 @@ _CURVES = {"episode", "fraction"} | _IDENTITY
 
 def entry_color(entry: str) -> str:
     """An entry's color in every figure; a variant without a piece has that of the piece."""
-    if entry in (colors := {PEER: OKABE_ITO["vermillion"], GENERALIST: _AT_ONCE}):
-        return colors[entry]
+    if entry in _BESIDE:
+        return _BESIDE[entry]
     piece = entry.partition("-")[2]
     name, known = (piece, PIECES) if piece else (entry, tuple(ALGORITHMS))
     return OKABE_ITO[_OTHERS[known.index(name) % len(_OTHERS)]] if name in known else _UNKNOWN
