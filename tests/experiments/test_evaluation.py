@@ -275,6 +275,14 @@ def test_several_helpers_have_columns_of_their_own(
         assert any(offloads)
 
 
+@pytest.mark.parametrize("power_control", [False, True])
+def test_a_flight_of_one_place_hovers_there(power_control: bool) -> None:
+    scenario = dataclasses.replace(SCENARIO, power_control=power_control)
+    policy = FlightPolicy([scenario.helper_starts], scenario)
+    flights = evaluate(scenario, "hovering", {"optimum": policy}, FEW).flights
+    assert set(zip(flights["x"], flights["y"], strict=True)) == set(scenario.helper_starts)
+
+
 def test_what_helpers_do_together_is_made_of_what_each_does() -> None:
     two = dataclasses.replace(Scenario.preset("two_eavesdroppers"), num_slots=4)
     path = torch.tensor(two.helper_starts).expand(5, 2, 2).clone()
