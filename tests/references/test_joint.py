@@ -49,7 +49,7 @@ def test_the_joint_program_on_a_grid_of_ten_metres(
         planner = SeveralHelpers(Physics(scenario, dtype=torch.float64), 10.0, 1.0, 2, seed=0)
         for mode_rule, expected in values.items():
             plan = planner._joint_plan(mode_rule, num_slots)
-            found = planner._earned(planner._quiet, mode_rule, plan)
+            found = planner._quiet.of_flight(mode_rule, *plan)
             assert found == pytest.approx(expected[index], rel=1e-3)
 
 

@@ -81,19 +81,12 @@ class SeveralHelpers:
             self._improved(self._quiet, mode_rule, plan, turns)
             for plan in self._beginnings(mode_rule, num_slots)
         ]
-        best = max(plans, key=lambda plan: self._earned(self._quiet, mode_rule, plan))
+        best = max(plans, key=lambda plan: self._quiet.of_flight(mode_rule, *plan))
         return self._improved(self._expected, mode_rule, best, turns)
 
     def improved(self, mode_rule: str, plan: Plan, turns: int) -> Plan:
         """A flight on the helpers' grids, improved in so many turns at most."""
         return self._improved(self._expected, mode_rule, plan, turns)
-
-    def earned(self, mode_rule: str, plan: Plan) -> float:
-        """What a flight is expected to bring in bps/Hz."""
-        return self._earned(self._expected, mode_rule, plan)
-
-    def _earned(self, expected: ExpectedReward, mode_rule: str, plan: Plan) -> float:
-        return float(expected([mode_rule], plan[0][1:], plan[1]).sum())
 
     def _beginnings(self, mode_rule: str, num_slots: int) -> Iterator[Plan]:
         """Flights to begin with."""
@@ -161,11 +154,11 @@ class SeveralHelpers:
     ) -> Plan:
         """Flights improved in turn until none improves."""
         reaches = reaches_of(self._physics, mode_rule, self._resolution)
-        value, unimproved = self._earned(expected, mode_rule, plan), 0
+        value, unimproved = expected.of_flight(mode_rule, *plan), 0
         for turn in range(turns):
             helper = turn % len(reaches)
             own = self._best_of_one(expected, mode_rule, plan, helper, reaches[helper])
-            found = self._earned(expected, mode_rule, own)
+            found = expected.of_flight(mode_rule, *own)
             unimproved += 1
             if found > value + 1e-9:
                 plan, value, unimproved = own, found, 0
@@ -178,7 +171,8 @@ class SeveralHelpers:
     ) -> Plan:
         """The plan with one helper's flight as good as can be near its own, the others' held."""
         (path, power), grid = plan, self._grids[helper]
-        positions, rough = grid.positions(), expected if expected is self._quiet else self._rough
+        positions = grid.positions().to(path)
+        rough = expected if expected is self._quiet else self._rough
         held = torch.cat([path[1:], power.unsqueeze(-1)], dim=-1)
         held[:, helper] = 1.0
         others, group = held.unique(dim=0, return_inverse=True)
@@ -200,7 +194,7 @@ class SeveralHelpers:
         levels = levels.reshape(-1, *grid.shape)
         flight = best_flight(rewards, values_to_go(rewards, reach), reach, grid.start)
         path, power = path.clone(), power.clone()
-        path[:, helper] = grid.places(flight)
+        path[:, helper] = grid.places(flight).to(path)
         row, column = flight[1:].T
         power[:, helper] = levels[torch.arange(len(levels)), row, column]
         return path, power

@@ -54,7 +54,7 @@ def best_levels(
     Returns:
         (len(mode_rules), P) bps/Hz, and (len(mode_rules), P) in units of the nominal power.
     """
-    levels = levels_of(rough.physics.scenario, step)
+    levels = levels_of(rough.physics.scenario, step).to(places)
     if len(levels) == 1:
         rewards = expected(mode_rules, places, None if bool((power == 1).all()) else power)
         return rewards, torch.ones_like(rewards)

@@ -62,6 +62,10 @@ class ExpectedReward:
                 torch.mean(best, dim=-1, out=mean)
         return means
 
+    def of_flight(self, mode_rule: str, path: Tensor, power: Tensor) -> float:
+        """What a flight (T + 1, H, 2) m with powers (T, H) brings under a mode rule, in bps/Hz."""
+        return float(self([mode_rule], path[1:], power).sum())
+
 
 def estimate_return(
     physics: Physics,

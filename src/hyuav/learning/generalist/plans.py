@@ -1,14 +1,18 @@
 """Rough flights of all helpers together: what leads those that decide one after another."""
 
-from typing import NamedTuple, Self
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from hyuav.learning.generalist.scene import Others
+from hyuav.physics.modes import allowed_vectors
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
+from hyuav.references.ascent import Ascent
 from hyuav.references.joint import SeveralHelpers
+from hyuav.references.rewards import ExpectedReward
 
 
 class Coarseness(NamedTuple):
@@ -20,15 +24,11 @@ class Coarseness(NamedTuple):
     """Of a slot's fading, over which what it brings is averaged; 1 leaves it out."""
 
 
-OF_ONE, OF_SEVERAL = Coarseness(4.0, 32), Coarseness(20.0, 1)
+OF_ONE, OF_SEVERAL = Coarseness(4.0, 32), Coarseness(20.0, 8)
 """For one helper, and for several."""
 
-NEAR = 5.0
-"""Of the grid in m on which flights of several helpers are made better nearby."""
-
-TURNS_OF_EACH, TURNS_NEARBY = 2, 6
-"""How often each of several helpers' flights is improved at most, with the others' held: anywhere,
-and nearby, where powers that are too high fall in turn."""
+TURNS_OF_EACH = 2
+"""How often each of several helpers' flights is improved at most, with the others' held."""
 
 POWER_STEP = 15.0
 """Between the levels of power that are tried, in dB."""
@@ -37,6 +37,14 @@ POWER_STEP = 15.0
 def coarseness(scenario: Scenario) -> Coarseness:
     """How roughly the flights of a scenario are found."""
     return OF_ONE if scenario.num_helpers == 1 else OF_SEVERAL
+
+
+def shared_draws(scenario: Scenario, mode_rule: str, draws: int) -> int:
+    """How many draws of the fading are left to each of the modes that a rule allows, 1 at least.
+
+    The best one of many modes rests less on fading, and takes as long as all of them.
+    """
+    return max(draws // len(allowed_vectors(mode_rule, scenario.num_helpers)), 1)
 
 
 class Plan(NamedTuple):
@@ -48,27 +56,35 @@ class Plan(NamedTuple):
     """(T, H), powers in units of the nominal one."""
 
     @classmethod
-    def roughly_best(cls, scenario: Scenario, mode_rule: str) -> Self:
+    def roughly_best(cls, scenario: Scenario, mode_rule: str) -> "Plan":
         """The best rough flight that is found."""
-        physics = Physics(scenario, dtype=torch.float64, layout_is_known=False)
+        physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
         spacing, draws = coarseness(scenario)
+        if scenario.num_helpers > 1:
+            draws = shared_draws(scenario, mode_rule, draws)
         anywhere = SeveralHelpers(
             physics, spacing, POWER_STEP, draws, seed=0, window=scenario.map_side
         )
         straight = list(anywhere.straight(scenario.num_slots))
         if scenario.num_helpers == 1:  # whose program does not depend on where it begins
-            path, share = anywhere.improved(mode_rule, straight[0], turns=1)
-            return cls(path.float(), share.float())
+            return cls(*anywhere.improved(mode_rule, straight[0], turns=1))
         turns = TURNS_OF_EACH * scenario.num_helpers
-        found = anywhere.best(mode_rule, scenario.num_slots, turns)
-        nearby = SeveralHelpers(physics, NEAR, POWER_STEP, draws, seed=0, window=spacing)
-        turns = TURNS_NEARBY * scenario.num_helpers
-        # Right above an eavesdropper a helper jams best, which a coarse grid may miss.
-        plans = [nearby.improved(mode_rule, plan, turns) for plan in (found, *straight)]
-        path, share = max(plans, key=lambda plan: nearby.earned(mode_rule, plan))
-        return cls(path.float(), share.float())
+        if scenario.num_helpers == 2:
+            rough = [anywhere.best(mode_rule, scenario.num_slots, turns)]
+        else:
+            rough = [anywhere.improved(mode_rule, plan, turns) for plan in straight]
+        plans = climbed(scenario, mode_rule, [cls(*plan) for plan in (*rough, *straight)])
+        judging = ExpectedReward(physics, OF_SEVERAL.draws, torch.Generator().manual_seed(2))
+        return max(plans, key=lambda plan: judging.of_flight(mode_rule, *plan))
 
     @property
     def at_the_end(self) -> Others:
         """Where the helpers are after the last slot, and their powers in it."""
         return Others(self.path[-1], self.share[-1])
+
+
+def climbed(scenario: Scenario, mode_rule: str, plans: Iterable[Plan]) -> list[Plan]:
+    """Flights made better by the gradient of what they bring."""
+    physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
+    ascent = Ascent(physics, mode_rule, OF_SEVERAL.draws, seed=1)
+    return [Plan(*plan) for plan in ascent.improved([*plans])]

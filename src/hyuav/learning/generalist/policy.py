@@ -9,12 +9,12 @@ from torch import Tensor
 
 from hyuav.learning.generalist.decide import Choice, Helpers, World, choices
 from hyuav.learning.generalist.network import GeneralistNetwork
-from hyuav.learning.generalist.plans import Plan, coarseness
+from hyuav.learning.generalist.plans import Plan, climbed, coarseness, shared_draws
 from hyuav.learning.generalist.scene import (
     CANDIDATES,
     DRAWS,
-    POWER_STEP,
     ROUGH_DRAWS,
+    ROUGH_STEP,
     TURNS,
     scenes_of,
 )
@@ -71,14 +71,16 @@ class GeneralistPolicy(TensorDictModuleBase):
         self._several = scenario.num_helpers > 1
         self._rough = Plan.roughly_best(scenario, mode_rule)
         draws = DRAWS if scenario.power_control else 4 * DRAWS
+        few, several = ROUGH_DRAWS, DRAWS_OF_SEVERAL
         if self._several:
-            draws = ROUGH_DRAWS
+            few, several = (shared_draws(scenario, mode_rule, own) for own in (few, several))
+            draws = few
         scenes = scenes_of(scenario, mode_rule, draws, self._rough.at_the_end)
         self.world = World(scenes, Tokens.of([scenario] * scenes.count))
         physics = Physics(scenario, dtype=torch.float32)
         self._few_draws, self._expected, self._judging = (
             ExpectedReward(physics, count, torch.Generator().manual_seed(0))
-            for count in (ROUGH_DRAWS, DRAWS_OF_SEVERAL, 4 * DRAWS)
+            for count in (few, several, 4 * DRAWS)
         )
         self._seen, self._flight = self._best_flight()
 
@@ -90,6 +92,9 @@ class GeneralistPolicy(TensorDictModuleBase):
         ways = Seen(turns.repeat_interleave(len(windows), dim=0), windows.repeat(len(turns)))
         path, share = self._flown(ways)
         plans = [Plan(path[:, way], share[:, way]) for way in range(len(ways.turn))]
+        if self._several:
+            with torch.enable_grad():
+                plans = climbed(self.scenario, self.mode_rule, plans)
         earned = [self.expected(plan) for plan in plans]
         best = earned.index(max(earned))
         flight = self._rough if self.expected(self._rough) >= earned[best] else plans[best]
@@ -110,8 +115,7 @@ class GeneralistPolicy(TensorDictModuleBase):
 
     def expected(self, plan: Plan) -> float:
         """What a flight is expected to bring in bps/Hz."""
-        path, share = (each.float() for each in plan)
-        return float(self._judging([self.mode_rule], path[1:], share).sum())
+        return self._judging.of_flight(self.mode_rule, *(each.float() for each in plan))
 
     def plan(self) -> Plan:
         """The flight from the start."""
@@ -183,7 +187,7 @@ class GeneralistPolicy(TensorDictModuleBase):
             places[row, few].flatten(0, 1),
             power[row, few].flatten(0, 1),
             helper,
-            POWER_STEP,
+            ROUGH_STEP,
         )
         now = rewards[0].reshape(few.shape) / best
         worth = torch.full_like(worth, -torch.inf).scatter(1, few, later.gather(1, few) + now)
