@@ -58,15 +58,15 @@ def main() -> None:
             found, _ = train(algorithm, "cuda", compiled=compiled, learners=3, episodes=20)
             apart = (found - expected).abs().max()
             print(f"{name}, compiled={compiled}: at most {apart:.1e} bps/Hz from the CPU's rewards")
-    for learners in (16, 256):
-        for algorithm in (DDPG(), SHORT):
-            _, seconds = train(algorithm, "cuda", compiled=True, learners=learners, episodes=60)
-            rate = learners / seconds
-            print(f"{type(algorithm).__name__}, {learners} learners: {rate:,.0f} steps/s")
     for helpers in (65_536, 1_048_576):
         for compiled in (False, True):
             rate = fly(helpers, compiled=compiled)
             print(f"environment, {helpers:,} helpers, compiled={compiled}: {rate:,.0f} slots/s")
+    for learners in (16, 256, 4096):
+        for algorithm in (DDPG(), SHORT):
+            _, seconds = train(algorithm, "cuda", compiled=True, learners=learners, episodes=60)
+            rate = learners / seconds
+            print(f"{type(algorithm).__name__}, {learners} learners: {rate:,.0f} steps/s")
 
 
 if __name__ == "__main__":
