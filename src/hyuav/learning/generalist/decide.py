@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from hyuav.learning.generalist.network import GeneralistNetwork
 from hyuav.learning.generalist.scene import (
@@ -50,9 +50,7 @@ class Choice(NamedTuple):
     """(B, REACH^2) int64: the candidates in the scene's maps."""
 
 
-def choices(
-    network: GeneralistNetwork, world: World, helpers: Helpers, turn: Tensor = TURNS[0]
-) -> Choice:
+def choices(network: nn.Module, world: World, helpers: Helpers, turn: Tensor = TURNS[0]) -> Choice:
     """Estimate what each place within reach is worth.
 
     Args:

@@ -2,23 +2,29 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import torch
 import torch.nn.functional as F  # noqa: N812
 from pydantic.dataclasses import dataclass
 from tensordict import TensorDict
 from torch import Tensor, nn
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from torchrl.data import ReplayBuffer, TensorStorage
 
-from hyuav._support.parameters import Count, CountOrZero, Parameters, PositiveNumber, parameter
+from hyuav._support.parameters import (
+    Count,
+    CountOrZero,
+    OneOf,
+    Parameters,
+    PositiveNumber,
+    parameter,
+)
 from hyuav.learning.generalist.decide import Helpers, choices, flights
 from hyuav.learning.generalist.lessons import Lessons
 from hyuav.learning.generalist.network import GeneralistNetwork
+from hyuav.learning.generalist.reinforcement import TEMPERATURE, bellman_error
 from hyuav.learning.generalist.scene import TURNS
-
-TEMPERATURE = 0.02
-"""Of the softmax over places, in units of what the best place brings in a slot."""
 
 WARM_UP = 100
 """Steps in which the learning rate rises to its largest."""
@@ -30,13 +36,20 @@ LONGEST_GRADIENT = 1.0
 """Longer ones are shortened."""
 
 WEIGHTS = {"regret": 10.0, "divergence": 0.2, "error": 5.0}
-"""Of the parts of the loss."""
+"""Of the parts of the imitation's loss; the last one is that of the Bellman error too."""
+
+WAYS = ("imitation", "reinforcement", "both")
+
+KEPT = 0.99
+"""Of the delayed weights, in each step."""
 
 
 @dataclass(frozen=True)
 class GeneralistParameters(Parameters):
     """How a generalist learns."""
 
+    way: Annotated[str, OneOf(*WAYS)] = parameter("imitation")
+    """From the exact values of solved scenarios, from what its own decisions bring, or both."""
     steps: Count = parameter(8000)
     """Of gradient descent."""
     batch_size: Count = parameter(512)
@@ -104,7 +117,6 @@ class Progress(NamedTuple):
 
     step: int
     loss: float
-    regret: float
     mean: float
     """Of what it earns in the scenarios for validation, in units of the optimum; so below."""
     fifth_percentile: float
@@ -112,7 +124,7 @@ class Progress(NamedTuple):
 
 
 class GeneralistTraining:
-    """A generalist that learns from solved scenarios.
+    """A generalist that learns across scenarios.
 
     Half of each mini-batch is anywhere; the other half is where its own flights led when it last
     flew (Ross, Gordon, Bagnell, AISTATS 2011), kept in TorchRL's replay buffer.
@@ -131,6 +143,7 @@ class GeneralistTraining:
             torch.manual_seed(parameters.seed)
             self.network = GeneralistNetwork()
         self.network.to(lessons.optimum.device)
+        self._delayed = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(KEPT))
         self._optimizer = torch.optim.AdamW(
             self.network.parameters(),
             parameters.learning_rate,
@@ -154,6 +167,7 @@ class GeneralistTraining:
         return {
             "step": self.step,
             "network": self.network.state_dict(),
+            "delayed": self._delayed.state_dict(),
             "optimizer": self._optimizer.state_dict(),
         }
 
@@ -161,6 +175,7 @@ class GeneralistTraining:
         """Go on where :meth:`state_dict` was taken."""
         self.step = state["step"]
         self.network.load_state_dict(state["network"])
+        self._delayed.load_state_dict(state["delayed"])
         self._optimizer.load_state_dict(state["optimizer"])
 
     def _flown(self) -> ReplayBuffer:
@@ -173,7 +188,7 @@ class GeneralistTraining:
         visited = TensorDict(states._asdict(), batch_size=[len(states.scene)])
         return ReplayBuffer(storage=TensorStorage(visited))
 
-    def _learn(self) -> Loss:
+    def _learn(self) -> Tensor:
         parameters, total = self.parameters, self.parameters.steps
         # A step's random numbers are its own, so that a training can go on at any of them.
         generator = torch.Generator().manual_seed(parameters.seed * 2**32 + self.step)
@@ -186,27 +201,39 @@ class GeneralistTraining:
         turn = torch.stack(TURNS)[
             torch.randint(len(TURNS), (parameters.batch_size,), generator=generator)
         ]
-        loss = imitation_loss(self.network, self._lessons, Helpers(*both), turn)
+        loss = self._loss(Helpers(*both), turn, generator)
         falling = 0.5 * (1.0 + math.cos(math.pi * self.step / total))
         rate = min(1.0, (self.step + 1) / WARM_UP) * (LAST_RATE + (1.0 - LAST_RATE) * falling)
         for group in self._optimizer.param_groups:
             group["lr"] = parameters.learning_rate * rate
         self._optimizer.zero_grad()
-        loss.total.backward()
+        loss.backward()
         nn.utils.clip_grad_norm_(self.network.parameters(), LONGEST_GRADIENT)
         self._optimizer.step()
+        if parameters.way != "imitation":
+            self._delayed.update_parameters(self.network)
         self.step += 1
-        return loss
+        return loss.detach()
 
-    def _progress(self, loss: Loss) -> Progress:
+    def _loss(self, helpers: Helpers, turn: Tensor, generator: torch.Generator) -> Tensor:
+        parts, way = [], self.parameters.way
+        if way != "reinforcement":
+            parts.append(imitation_loss(self.network, self._lessons, helpers, turn).total)
+        if way != "imitation":
+            error = bellman_error(
+                self.network, self._delayed, self._lessons.world, helpers, turn, generator
+            )
+            parts.append(WEIGHTS["error"] * error)
+        return torch.stack(parts).sum()
+
+    def _progress(self, loss: Tensor) -> Progress:
         world = self._validation.world
         scene = torch.arange(world.scenes.count, device=world.scenes.start.device)
         earned, _ = flights(self.network, world, scene)
         fraction = earned / self._validation.optimum
         return Progress(
             self.step,
-            float(loss.total.detach()),
-            float(loss.regret.detach()),
+            float(loss),
             float(fraction.mean()),
             float(fraction.quantile(0.05)),
             float(fraction.min()),
