@@ -43,28 +43,19 @@ class Links(NamedTuple):
             return self
         return Links(*(gain * power for gain, power in zip(self, fading, strict=True)))
 
-    @property
-    def to_legitimate(self) -> tuple[Tensor, ...]:
-        """The numbers of each helper's link to the legitimate UAV: H of (..., 1)."""
-        return self.helper_legitimate.split(1, dim=-1)
+    def to_legitimate(self, helper: int) -> Tensor:
+        """The number of a helper's link to the legitimate UAV, (..., 1)."""
+        return self.helper_legitimate.narrow(-1, helper, 1)
 
-    @property
-    def to_eavesdroppers(self) -> tuple[Tensor, ...]:
-        """The numbers of each helper's links to the eavesdroppers: H of (..., E)."""
-        return self.helper_eavesdropper.unbind(dim=-2)
+    def to_eavesdroppers(self, helper: int) -> Tensor:
+        """The numbers of a helper's links to the eavesdroppers, (..., E)."""
+        return self.helper_eavesdropper.select(-2, helper)
 
-    def between_helpers(self, helper: int) -> list[Tensor]:
-        """The numbers of one helper's links to each helper, 0 for itself: H of (..., 1)."""
-        own = self.to_legitimate[helper]
-        numbers = dict(
-            zip(pairs(len(self.to_legitimate)), self.helper_helper.split(1, dim=-1), strict=True)
-        )
-        return [
-            torch.zeros_like(own)
-            if other == helper
-            else numbers[min(helper, other), max(helper, other)]
-            for other in range(len(self.to_legitimate))
-        ]
+    def to_helper(self, helper: int, other: int) -> Tensor:
+        """The number of the link between two helpers, (..., 1)."""
+        pair = min(helper, other), max(helper, other)
+        number = pairs(self.helper_legitimate.shape[-1]).index(pair)
+        return self.helper_helper.narrow(-1, number, 1)
 
 
 @dataclass(frozen=True)
@@ -107,7 +98,7 @@ class LinkRow:
 
     def unflatten(self, row: Tensor) -> Links:
         """The numbers of a row (..., size) by link; they share its memory."""
-        parts = zip(row.split(self.counts, dim=-1), self.shapes, strict=True)
+        parts = zip(row.split_with_sizes(self.counts, dim=-1), self.shapes, strict=True)
         return Links(
             *(
                 part if len(shape) == 1 else torch.unflatten(part, -1, shape)

@@ -1,8 +1,8 @@
 """Achievable rates of the two modes (the paper's rate table) and the secrecy sum-rate (eq. 6)."""
 
 import math
-from collections.abc import Sequence
-from functools import reduce
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
 from typing import NamedTuple
 
 import torch
@@ -24,17 +24,17 @@ class AchievableRates(NamedTuple):
     @property
     def legitimate(self) -> Tensor:
         """R^d_u: (..., U) bps/Hz."""
-        return self.time_share * spectral_efficiency(self.legitimate_snr)
+        return spectral_efficiency(self.legitimate_snr, self.time_share)
 
     @property
     def eavesdropper(self) -> Tensor:
         """R^e_u: (..., U) bps/Hz."""
-        return self.time_share * spectral_efficiency(self.eavesdropper_snr)
+        return spectral_efficiency(self.eavesdropper_snr, self.time_share)
 
 
-def spectral_efficiency(snr: Tensor) -> Tensor:
-    """log2(1 + SNR) in bps/Hz, accurate for small SNR too."""
-    return torch.log1p(snr) * (1.0 / math.log(2.0))
+def spectral_efficiency(snr: Tensor, time_share: float = 1.0) -> Tensor:
+    """log2(1 + SNR) in bps/Hz, accurate for small SNR too, in a share of the time."""
+    return torch.log1p(snr) * (time_share / math.log(2.0))
 
 
 class Sent(NamedTuple):
@@ -69,11 +69,12 @@ def straight_rates(
         jammers: the helpers that jam, at least one, counted from 0.
         eavesdroppers: as for :func:`overheard`.
     """
-    at_legitimate = sent.ue / _noise(sent, jammers, gains.to_legitimate)
-    at_eavesdroppers = sent.ue / _noise(sent, jammers, gains.to_eavesdroppers).unsqueeze(-2)
+    # A number over a tensor is the same, by way of Python.
+    at_legitimate = _noise(sent, jammers, gains.to_legitimate).reciprocal() * sent.ue
+    at_eavesdroppers = _noise(sent, jammers, gains.to_eavesdroppers).reciprocal() * sent.ue
     return AchievableRates(
         at_legitimate * gains.ue_legitimate,
-        overheard(at_eavesdroppers * gains.ue_eavesdropper, eavesdroppers),
+        overheard(at_eavesdroppers.unsqueeze(-2) * gains.ue_eavesdropper, eavesdroppers),
         1.0,
     )
 
@@ -91,19 +92,19 @@ def relay_rates(
         eavesdroppers: as for :func:`overheard`.
     """
     own = sent.relay[relay]
-    combined = own * gains.to_legitimate[relay] + sent.ue * gains.ue_legitimate
+    combined = own * gains.to_legitimate(relay) + sent.ue * gains.ue_legitimate
     decoded = sent.ue * gains.ue_helper.select(-1, relay)
-    heard = (own * gains.to_eavesdroppers[relay]).unsqueeze(-2) + sent.ue * gains.ue_eavesdropper
+    heard = (own * gains.to_eavesdroppers(relay)).unsqueeze(-2) + sent.ue * gains.ue_eavesdropper
     if jammers:
         combined = combined / _noise(sent, jammers, gains.to_legitimate)
-        decoded = decoded / _noise(sent, jammers, gains.between_helpers(relay))
+        decoded = decoded / _noise(sent, jammers, partial(gains.to_helper, relay))
         heard = heard / _noise(sent, jammers, gains.to_eavesdroppers).unsqueeze(-2)
     return AchievableRates(torch.minimum(combined, decoded), overheard(heard, eavesdroppers), 0.5)
 
 
-def _noise(sent: Sent, jammers: Sequence[int], gains: Sequence[Tensor]) -> Tensor:
-    """Noise and jamming in units of sigma^2, from the gains of each helper (..., k): (..., k)."""
-    received = [sent.jamming[jammer] * gains[jammer] for jammer in jammers]
+def _noise(sent: Sent, jammers: Sequence[int], gain: Callable[[int], Tensor]) -> Tensor:
+    """Noise and jamming in units of sigma^2, by the gains (..., k) of each jammer: (..., k)."""
+    received = [sent.jamming[jammer] * gain(jammer) for jammer in jammers]
     return reduce(torch.add, received) + 1.0
 
 
@@ -115,6 +116,8 @@ def overheard(snr: Tensor, eavesdroppers: str) -> Tensor:
         eavesdroppers: "independent", where the best-placed one counts, or "colluding", where their
             SNRs add up.
     """
+    if snr.shape[-1] == 1:
+        return snr.squeeze(-1)
     return snr.sum(dim=-1) if eavesdroppers == "colluding" else snr.amax(dim=-1)
 
 
@@ -125,7 +128,7 @@ def secrecy_rate(rates: AchievableRates) -> Tensor:
     cancel where both rates are large.
     """
     gap = (rates.legitimate_snr - rates.eavesdropper_snr).clamp(min=0.0)
-    return rates.time_share * spectral_efficiency(gap / (1.0 + rates.eavesdropper_snr))
+    return spectral_efficiency(gap / (1.0 + rates.eavesdropper_snr), rates.time_share)
 
 
 def secrecy_sum_rate(secrecy_rate: Tensor, offloading: Tensor) -> Tensor:

@@ -31,6 +31,8 @@ class StandingNodes(NamedTuple):
     """(..., U) bool: whom L covers."""
     may_send: Tensor
     """(..., U) bool: whom L covers and who can pay for sending straight to it."""
+    may_be_relayed: Tensor
+    """(..., U) bool: whom L covers and who can pay for sending to a relay."""
 
 
 class Geometry(NamedTuple):
@@ -76,7 +78,6 @@ class Physics:
         self.link_row = LinkRow.of(scenario)
         self.k_factor = self._k_factor()
         """Of all links, (link_row.size,), as power ratios."""
-        self._pays_for_relaying = energy.ue_can_pay(scenario, relay=True)
         self._sent = self._nominal()
         self.mode_vectors = [
             torch.tensor(vector, device=self.device)
@@ -123,7 +124,7 @@ class Physics:
             channel.ground_to_air(scenario, to_legitimate, scenario.altitude),
             channel.ground_to_air(scenario, to_eavesdroppers, scenario.eavesdropper_altitude),
             covered,
-            covered & energy.ue_can_pay(scenario, relay=False),
+            *(covered & energy.ue_can_pay(scenario, relay=relay) for relay in (False, True)),
         )
 
     def standing(self, nodes: Nodes) -> StandingNodes:
@@ -144,7 +145,8 @@ class Physics:
 
     def by_role(self, distances: Tensor) -> tuple[Tensor, ...]:
         """The parts of :meth:`distances`: to the UEs (..., U), to L (..., 1), the rest (..., E)."""
-        return distances.split((self.scenario.num_ues, 1, self.scenario.num_eavesdroppers), dim=-1)
+        counts = self.scenario.num_ues, 1, self.scenario.num_eavesdroppers
+        return tuple(distances.split_with_sizes(counts, dim=-1))
 
     def geometry(self, nodes: Nodes) -> Geometry:
         """Distances and path gains (eq. 3 and 4 without fading) of all links."""
@@ -285,7 +287,7 @@ class Physics:
                 through = rates.relay_rates(gains, sent, helper, jammers, kind)
                 distance = geometry.ue_to_helper[..., helper]
                 near = offloading.covered(distance, self.scenario.coverage_radius)
-                allowed = near & geometry.standing.covered & self._pays_for_relaying
+                allowed = near & geometry.standing.may_be_relayed
                 ways.append((helper + 1, rates.secrecy_rate(through), allowed))
         return ways
 
