@@ -30,6 +30,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "__main__.py"
 
 torch.set_num_threads(1)
 os.environ["OMP_NUM_THREADS"] = "1"  # of the processes that tests start
+os.environ["TORCHINDUCTOR_DEBUG_COMPILE"] = "1"  # what is not optimized is compiled in half the time
 gc.freeze()  # or each search for garbage would go through all libraries
 settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=True)
 settings.load_profile("hyuav")
