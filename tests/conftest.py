@@ -34,6 +34,7 @@ os.environ["OMP_NUM_THREADS"] = "1"  # of the processes that tests start
 os.environ["TORCHINDUCTOR_DEBUG_COMPILE"] = "1"  # without optimizing, which takes half the time
 Options._drop_tables_default += ["GDEF", "GPOS", "GSUB"]  # of fonts; no PDF needs what takes long
 gc.freeze()  # or each search for garbage would go through all libraries
+gc.set_threshold(10_000, 20, 20)  # and seldom, since what tests leave is little
 settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=True)
 settings.load_profile("hyuav")
 
