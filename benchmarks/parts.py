@@ -87,20 +87,22 @@ def environment(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator
     Peak memory is that of a process that has flown all batch sizes.
     """
     threads, seconds = threads_to_try(), plan.seconds / 10
+    combinations = {helpers: _combinations(threads, helpers) for helpers in plan.batches}
+    measured = {name for own in combinations.values() for name, *_ in own}
     rows: list[Row] = []
     with contextlib.ExitStack() as stack:
         workers = {
             name: stack.enter_context(
                 Worker(Entry(name, _work(plan, scenario, threads=threads[-1])))
             )
-            for name in (*ENVIRONMENTS, "numpy")
+            for name in (*sorted(measured), "numpy")
         }
         workers["numpy"].start(Entry("numpy", _work(plan, scenario)))
         for number in range(1, plan.rounds + 1):
             report(f"environment: round {number}")
             rows.append(workers["numpy"].measure("environment", seconds, number))
-            for helpers in plan.batches:
-                for name, device, count in _combinations(threads, helpers):
+            for helpers, own in combinations.items():
+                for name, device, count in own:
                     work = _work(plan, scenario, helpers=helpers, threads=count, device=device)
                     workers[name].start(Entry(name, work))
                     rows.append(workers[name].measure("environment", seconds, number))

@@ -15,6 +15,7 @@ from typing import Any
 import gymnasium
 import pytest
 import torch
+from fontTools.subset import Options
 from hypothesis import settings
 
 import hyuav  # noqa: F401 - registers the environments
@@ -30,7 +31,10 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "__main__.py"
 
 torch.set_num_threads(1)
 os.environ["OMP_NUM_THREADS"] = "1"  # of the processes that tests start
+os.environ["TORCHINDUCTOR_DEBUG_COMPILE"] = "1"  # without optimizing, which takes half the time
+Options._drop_tables_default += ["GDEF", "GPOS", "GSUB"]  # of fonts; no PDF needs what takes long
 gc.freeze()  # or each search for garbage would go through all libraries
+gc.set_threshold(10_000, 20, 20)  # and seldom, since what tests leave is little
 settings.register_profile("hyuav", deadline=None, max_examples=50, derandomize=True)
 settings.load_profile("hyuav")
 

@@ -17,6 +17,8 @@ FULL_EDGE = dataclasses.replace(
     Scenario.preset("random_disk"), edge_energy_budget=1.0, speed_limit="disc", num_slots=6
 )
 SIXTY = range(60)
+FAIR: dict[str, Any] = {"batch_size": 300, "clock": True, "reward": "proportional_fairness"}
+"""What two tests ask for, so that its program is compiled once."""
 
 COMPILES = pytest.mark.skipif(shutil.which("g++") is None, reason="needs a C++ compiler")
 
@@ -62,13 +64,13 @@ def assert_equal_up_to_rounding(eager: TensorDictBase, fast: TensorDictBase) -> 
 @pytest.fixture(
     scope="module",
     params=[
-        "proportional_fairness",
+        FAIR["reward"],
         pytest.param("secrecy_energy_efficiency", marks=pytest.mark.slow),
     ],
 )
 def flown(request: pytest.FixtureRequest) -> tuple[TensorDictBase, TensorDictBase]:
     """Eager and compiled, by a reward."""
-    return both_flights(TWO_CLUSTERS, batch_size=300, seed=1, clock=True, reward=request.param)
+    return both_flights(TWO_CLUSTERS, seed=1, **FAIR | {"reward": request.param})
 
 
 @COMPILES
@@ -144,14 +146,14 @@ def test_without_a_compiler_the_environment_is_the_eager_one(
 @COMPILES
 def test_actions_are_read_as_they_are_and_seeds_may_change_their_kind() -> None:
     eager, fast = (
-        make_env(TWO_CLUSTERS, batch_size=64, seed=[*range(64)], compiled=compiled)
+        make_env(TWO_CLUSTERS, seed=[*range(300)], compiled=compiled, **FAIR)
         for compiled in (False, True)
     )
-    actions = torch.rand(64, 2, dtype=torch.float64) * 2 - 1
+    actions = torch.rand(300, 2, dtype=torch.float64) * 2 - 1
     first, second = (env.step(env.reset().set("action", actions))["next"] for env in (eager, fast))
     torch.testing.assert_close(second["reward"], first["reward"], rtol=2e-5, atol=1e-4)
     for env in (eager, fast):
-        env.set_seed([*range(1, 65)], static_seed=True)
+        env.set_seed([*range(1, 301)], static_seed=True)
     assert fast._flight is not None
     first, second = (env.step(env.reset().set("action", actions))["next"] for env in (eager, fast))
     torch.testing.assert_close(second["reward"], first["reward"], rtol=2e-5, atol=1e-4)
@@ -159,5 +161,5 @@ def test_actions_are_read_as_they_are_and_seeds_may_change_their_kind() -> None:
         env.set_seed(3)
     first, second = (env.step(env.reset().set("action", actions))["next"] for env in (eager, fast))
     torch.testing.assert_close(second["reward"], first["reward"], rtol=2e-5, atol=1e-4)
-    with pytest.raises(InputError, match=r"^action = \(64, 3\): expected shape \(64, 2\)$"):
-        fast.step(fast.reset().set("action", torch.zeros(64, 3)))
+    with pytest.raises(InputError, match=r"^action = \(300, 3\): expected shape \(300, 2\)$"):
+        fast.step(fast.reset().set("action", torch.zeros(300, 3)))

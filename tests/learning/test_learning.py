@@ -31,8 +31,9 @@ FAST = "ddpg_robust"
 def test_a_short_training_earns_most_of_the_optimum(name: str) -> None:
     torch.set_num_threads(1)
     robust = name.endswith("robust")
-    rates = {"actor_learning_rate": 1e-3, "critic_learning_rate": 1e-3}
-    guided = {"guide": {"warm_up_episodes": 20}} if robust else {}
+    rate, warm_up = (3e-3, 10) if name == FAST else (1e-3, 20)
+    rates = {"actor_learning_rate": rate, "critic_learning_rate": rate}
+    guided = {"guide": {"warm_up_episodes": warm_up}} if robust else {}
     algorithm = ALGORITHMS[name].from_dict({"hidden_sizes": [64, 64], **rates, **guided})
     parameters = TrainingParameters(
         num_episodes=80 * (1 + robust),  # some of which are flown at random

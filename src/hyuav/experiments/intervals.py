@@ -37,6 +37,8 @@ def stratified_interval(samples: Sequence[Array], statistic: Statistic) -> tuple
         the lower and the upper bound (...).
     """
     sizes = [own.shape[-1] for own in samples]
+    if set(sizes) == {1}:  # drawn anew, they are what they are
+        return statistic(samples), statistic(samples)
     # SciPy wants two samples at least: one alone is given twice, and the second is left out.
     given = [np.concatenate([own, own], axis=-1) if own.shape[-1] == 1 else own for own in samples]
 
