@@ -62,7 +62,7 @@ class Guide(Parameters):
     displacement_range: Annotated[float, Field(ge=1.0, le=1e6)] = parameter(40.0)
     """Ratio of the largest typical displacement of a variation, which is what is flown in a slot,
     to the smallest."""
-    posterior_scale: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(3.0)
+    posterior_scale: Annotated[float, Field(ge=0.0, le=1e6)] = parameter(5.0)
     """By which the reward model's posterior is widened: it does not know what its features cannot
     show."""
     least_noise: PositiveNumber = parameter(1e-6)
