@@ -12,6 +12,7 @@ from hyuav.learning.weights import (
     copy_weights,
     count_learners,
     draw_weights,
+    finite_learners,
     join_learners,
     load_weights,
     replace_learners,
@@ -46,6 +47,20 @@ def test_only_the_named_learners_are_replaced(name: str) -> None:
         assert bool((values.select(axis, 1) == 7.0).all())
         assert torch.equal(values.select(axis, 0), own[key].select(axis, 0))
         assert torch.equal(values.select(axis, 2), own[key].select(axis, 2))
+
+
+@pytest.mark.parametrize("name", ["ddpg", "td3", "sac"])
+@pytest.mark.parametrize("damage", [torch.nan, torch.inf, -torch.inf])
+def test_one_number_that_is_not_finite_tells_whose_it_is(name: str, damage: float) -> None:
+    loss = ALGORITHMS[name](clock=False, hidden_sizes=(8,)).build(3, TEN_UES).loss
+    assert finite_learners(loss).tolist() == [True, True, True]
+    for weights in loss.parameters():
+        own = weights.data.select(-min(weights.ndim, 3), 1)
+        last = (-1,) * own.ndim
+        kept = own[last].item()
+        own[last] = damage
+        assert finite_learners(loss).tolist() == [True, False, True]
+        own[last] = kept
 
 
 def test_one_learners_weights_serve_all() -> None:

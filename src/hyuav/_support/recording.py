@@ -29,6 +29,14 @@ from torch.fx.experimental.symbolic_shapes import ShapeEnv
 COMPILATION_ERRORS = (BackendCompilerFailed, InductorError)
 """What :func:`compile_function` raises where there is no working compiler."""
 
+WITHOUT_EXTRAS = {
+    "aot_inductor.enable_frame_pointer": False,
+    "aot_inductor.enable_line_tables": False,
+    "cpp_cache_precompile_headers": False,
+}
+"""Options of Inductor: nothing for profilers, and no headers made ready, as both cost more time
+than they save."""
+
 
 class DoOnce(CustomGraphPass):
     """What a graph does twice to the same tensors, let it do once.
@@ -131,7 +139,9 @@ def _compile(
         "cpp_wrapper": on_cpu,
         "cpp.use_decompose_tanh": True,
         "cpp.vec_isa_ok": True if trust_compiler else None,
+        "memory_planning": on_cpu,
         "pattern_matcher": False,
+        "size_asserts": False,
         "post_grad_custom_pre_pass": DoOnce(),
     }
     return compile_graph(graph, arguments, options)
@@ -152,7 +162,7 @@ def compile_graph(
     """
     fake = FakeTensorMode(shape_env=ShapeEnv())  # which Inductor's cache on the disk needs
     examples: Any = [fake.from_tensor(each, static_shapes=True) for each in arguments]
-    options = {"cpp_cache_precompile_headers": False, **options}  # they cost more than they save
+    options = {**WITHOUT_EXTRAS, **options}
     with torch.no_grad(), tracing(TracingContext(fake)), warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # of PyTorch's own modules
         return torch._inductor.compile(graph, examples, options=options)

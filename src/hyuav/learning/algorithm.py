@@ -1,5 +1,6 @@
 """What every algorithm consists of; the training loop knows nothing else of it."""
 
+import functools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -293,7 +294,7 @@ class Algorithm:
         """Which gradient steps the update of this index takes, and last whether targets follow."""
         return tuple(index % period == 0 for period in self._periods)
 
-    @property
+    @functools.cached_property
     def _periods(self) -> tuple[int, ...]:
         return (*(step.every for step in self.steps), self.target_every)
 
