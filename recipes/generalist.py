@@ -2,6 +2,7 @@
 
 hyuav generalist output=runs/generalist
 hyuav generalist scenarios=600 learning.steps=2000
+hyuav generalist learning.way=reinforcement
 """
 
 import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to load
@@ -10,6 +11,7 @@ import hyuav._support.start  # noqa: F401 - first: the rest takes seconds to loa
 
 from pathlib import Path
 
+import pandas as pd
 import torch
 from rich.console import Console
 
@@ -24,6 +26,8 @@ from hyuav.experiments.generalist import (
     TrainGeneralist,
 )
 from hyuav.learning.generalist.training import GeneralistParameters
+from hyuav.viz.paper.progress import progress_figure
+from hyuav.viz.paper.style import save_figure
 
 
 @recipe(
@@ -46,7 +50,10 @@ def main(config: Config, directory: Path) -> None:
         f"{percent(last.fifth_percentile, 2)} at the 5th percentile, {percent(last.worst)} worst",
         console,
     )
-    print_line(f"weights: {directory / WEIGHTS_FILE}, progress: {PROGRESS_FILE}", console)
+    progress = pd.read_csv(directory / PROGRESS_FILE)
+    save_figure(progress_figure({parameters.way: progress}), directory, "progress")
+    told = f"{PROGRESS_FILE}, drawn in progress.png"
+    print_line(f"weights: {directory / WEIGHTS_FILE}, progress: {told}", console)
 
 
 if __name__ == "__main__":
