@@ -69,16 +69,12 @@ def test_a_recipe_loads_no_library_that_it_does_not_use() -> None:
     assert [set(own) for own in loaded] == [both | used for used in USED.values()]
 
 
-@pytest.mark.parametrize(
-    ("first", "name"),
-    [
-        ("import hyuav, gymnasium", "hyuav/SecureOffloading-v0"),
-        ("import gymnasium", "hyuav:hyuav/SecureOffloading-v0"),
-    ],
-)
-def test_gymnasium_makes_the_environment(first: str, name: str) -> None:
-    program = f"{first}; print(gymnasium.make({name!r}, scenario='two_clusters').reset()[0].shape)"
-    ran = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
-    assert ran.stdout == "(15,)\n"
+def test_gymnasium_makes_the_environment() -> None:
+    names = {
+        "import hyuav, gymnasium": "hyuav/SecureOffloading-v0",
+        "import gymnasium": "hyuav:hyuav/SecureOffloading-v0",
+    }
+    made = "assert gymnasium.make({!r}, scenario='two_clusters').reset()[0].shape == (15,)"
+    programs = [f"{first}; {made.format(name)}" for first, name in names.items()]
+    begin = "import tensordict, sys; assert 'gymnasium' not in sys.modules"
+    assert len(loaded_by(*programs, begin=begin)) == len(programs)
