@@ -19,6 +19,7 @@ from hyuav.viz.paper.style import COLUMN_WIDTH, PAGE_WIDTH, STYLE, save_figure
 COLORS = {
     "hyuav": OKABE_ITO["bluish green"],
     "hyuav_again": OKABE_ITO["bluish green"],
+    "hyuav_robust": OKABE_ITO["bluish green"],
     "stable_baselines3": OKABE_ITO["vermillion"],
     "sbx": OKABE_ITO["blue"],
     "cleanrl": OKABE_ITO["orange"],

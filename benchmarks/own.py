@@ -3,9 +3,16 @@
 import torch
 
 from benchmarks.work import ENDLESS, SLOTS_AT_A_TIME, Work
+from hyuav.learning.algorithm import AlgorithmParameters
 from hyuav.learning.ddpg import DDPG
+from hyuav.learning.guide.parameters import Guide
+from hyuav.learning.guide.robust import RobustDDPG
 from hyuav.learning.learners import Learner
 from hyuav.learning.training import Training, TrainingParameters
+
+WARM_UP_EPISODES, WORKING_EPISODES = 4, 4
+"""Of the robust variant: its guide's, fewer than it has by default since nobody asks what is
+learned, and those after them in which all that it does is done for the first time."""
 
 
 class OwnTraining:
@@ -13,19 +20,21 @@ class OwnTraining:
 
     Args:
         work: to do.
+        algorithm: another one than DDPG at the work's settings.
     """
 
-    def __init__(self, work: Work) -> None:
+    def __init__(self, work: Work, algorithm: AlgorithmParameters | None = None) -> None:
         self.width, self.warm_up_slots = work.learners, work.batch_size + SLOTS_AT_A_TIME
-        algorithm = DDPG(
-            hidden_sizes=work.hidden_sizes,
-            actor_learning_rate=work.actor_learning_rate,
-            critic_learning_rate=work.critic_learning_rate,
-            discount=work.discount,
-            target_rate=work.target_rate,
-            noise_variance=work.noise_variance,
-            noise_decay=work.noise_decay,
-        )
+        if algorithm is None:
+            algorithm = DDPG(
+                hidden_sizes=work.hidden_sizes,
+                actor_learning_rate=work.actor_learning_rate,
+                critic_learning_rate=work.critic_learning_rate,
+                discount=work.discount,
+                target_rate=work.target_rate,
+                noise_variance=work.noise_variance,
+                noise_decay=work.noise_decay,
+            )
         parameters = TrainingParameters(
             num_episodes=work.episodes,
             replay_size=work.replay_size,
@@ -50,3 +59,11 @@ class OwnTraining:
         if episode.accumulated_reward.is_cuda:
             torch.cuda.synchronize()
         return self._slots
+
+
+class OwnRobustTraining(OwnTraining):
+    """The robust variant at its own settings, measured when its guide's warm-up is over."""
+
+    def __init__(self, work: Work) -> None:
+        super().__init__(work, RobustDDPG(guide=Guide(warm_up_episodes=WARM_UP_EPISODES)))
+        self.warm_up_slots = (WARM_UP_EPISODES + WORKING_EPISODES) * work.scenario.num_slots

@@ -66,8 +66,8 @@ class Results:
         return summary
 
     def _floor(self, summary: pd.DataFrame, row: "pd.Series[Any]") -> float | None:
-        """Steps/s that nothing on this machine could exceed: by arithmetic, or by its draws."""
-        if row["part"] in TRAINING:
+        """Steps/s that nothing on this machine could exceed: by DDPG's arithmetic, or by draws."""
+        if row["part"] in TRAINING and row["entry"] != "hyuav_robust":
             flops = update_flops(row["num_ues"] + 5, Work.hidden_sizes, Work.batch_size)
             return self.matrix_rates[row["device"]] / flops
         if row["part"] == "environment" and row["entry"] != "numpy":

@@ -14,6 +14,7 @@ from hyuav._support.terminal import print_line, results_table
 LABELS = {
     "hyuav": "HyUAV",
     "hyuav_again": "HyUAV, run again",
+    "hyuav_robust": "HyUAV, robust variant",
     "stable_baselines3": "Stable-Baselines3",
     "sbx": "SBX",
     "cleanrl": "CleanRL-style",

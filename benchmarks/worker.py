@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 ENTRIES = {
     "hyuav": ("own", "OwnTraining"),
     "hyuav_again": ("own", "OwnTraining"),
+    "hyuav_robust": ("own", "OwnRobustTraining"),
     "stable_baselines3": ("stable_baselines", "StableBaselines3"),
     "sbx": ("stable_baselines", "SBX"),
     "cleanrl": ("cleanrl", "SingleFile"),

@@ -49,13 +49,16 @@ def test_the_benchmark_measures_prints_keeps_and_draws(
     assert content["machine"]["cores"] == cores()
     assert content["machine"]["versions"]["torch"] is not None
     trained = summary[summary["part"] == "training"].set_index("entry")
-    assert set(trained.index) == {"hyuav", "cleanrl", "stable_baselines3"}
+    assert set(trained.index) == {"hyuav", "hyuav_robust", "cleanrl", "stable_baselines3"}
     assert trained.loc["hyuav", "learners"] == 2
     reference = trained.loc["stable_baselines3", "median"]
     for entry, row in trained.iterrows():
         assert row["low"] <= row["median"] <= row["high"]
         assert math.isclose(row["ratio_to_stable_baselines3"], row["median"] / reference)
-        assert math.isclose(row["share_of_floor"], row["median"] / row["floor"])
+        if entry == "hyuav_robust":  # whose arithmetic is not DDPG's
+            assert row["share_of_floor"] is None or math.isnan(row["share_of_floor"])
+        else:
+            assert math.isclose(row["share_of_floor"], row["median"] / row["floor"])
         assert row["peak_mebibytes"] > 100
         measured = rows[(rows["part"] == "training") & (rows["entry"] == entry)]
         assert sorted(measured["round"]) == [1, 2]
