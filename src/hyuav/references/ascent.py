@@ -55,6 +55,7 @@ class Ascent:
         limit = physics.norm_limit([mode_rule])
         self._norm_limit = None if limit is None else limit[0]
 
+    @torch.enable_grad()
     def improved(self, plans: Sequence[Plan], steps: int = STEPS) -> list[Plan]:
         """Each flight after as many steps as served it best; they climb side by side."""
         scenario = self._physics.scenario

@@ -34,6 +34,14 @@ POWER_STEP = 15.0
 """Between the levels of power that are tried, in dB."""
 
 
+NEAR, WINDOW, FINE_STEP, FEW_DRAWS = 4.0, 8.0, 5.0, 4
+"""Of the last search nearby: the grid's spacing in m, how far in m a slot's place moves at most,
+the step in dB between levels of power, and the draws of a slot's fading."""
+
+FEW_MODES = 4
+"""That may be chosen in a slot, those of two helpers, for which all draws are taken."""
+
+
 def coarseness(scenario: Scenario) -> Coarseness:
     """How roughly the flights of a scenario are found."""
     return OF_ONE if scenario.num_helpers == 1 else OF_SEVERAL
@@ -44,7 +52,8 @@ def shared_draws(scenario: Scenario, mode_rule: str, draws: int) -> int:
 
     The best one of many modes rests less on fading, and takes as long as all of them.
     """
-    return max(draws // len(allowed_vectors(mode_rule, scenario.num_helpers)), 1)
+    vectors = len(allowed_vectors(mode_rule, scenario.num_helpers))
+    return max(draws * FEW_MODES // max(vectors, FEW_MODES), 1)
 
 
 class Plan(NamedTuple):
@@ -88,3 +97,12 @@ def climbed(scenario: Scenario, mode_rule: str, plans: Iterable[Plan]) -> list[P
     physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
     ascent = Ascent(physics, mode_rule, OF_SEVERAL.draws, seed=1)
     return [Plan(*plan) for plan in ascent.improved([*plans])]
+
+
+def settled(scenario: Scenario, mode_rule: str, plan: Plan) -> list[Plan]:
+    """A flight as it is, after each helper's program nearby, and after another climb from there."""
+    physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
+    draws = shared_draws(scenario, mode_rule, FEW_DRAWS)
+    nearby = SeveralHelpers(physics, NEAR, FINE_STEP, draws, seed=0, window=WINDOW)
+    found = Plan(*nearby.improved(mode_rule, plan, TURNS_OF_EACH * scenario.num_helpers))
+    return [plan, found, *climbed(scenario, mode_rule, [found])]

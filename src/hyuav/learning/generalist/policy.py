@@ -9,7 +9,13 @@ from torch import Tensor
 
 from hyuav.learning.generalist.decide import Choice, Helpers, World, choices
 from hyuav.learning.generalist.network import GeneralistNetwork
-from hyuav.learning.generalist.plans import Plan, climbed, coarseness, shared_draws
+from hyuav.learning.generalist.plans import (
+    Plan,
+    climbed,
+    coarseness,
+    settled,
+    shared_draws,
+)
 from hyuav.learning.generalist.scene import (
     CANDIDATES,
     DRAWS,
@@ -93,11 +99,12 @@ class GeneralistPolicy(TensorDictModuleBase):
         path, share = self._flown(ways)
         plans = [Plan(path[:, way], share[:, way]) for way in range(len(ways.turn))]
         if self._several:
-            with torch.enable_grad():
-                plans = climbed(self.scenario, self.mode_rule, plans)
+            plans = climbed(self.scenario, self.mode_rule, plans)
         earned = [self.expected(plan) for plan in plans]
         best = earned.index(max(earned))
         flight = self._rough if self.expected(self._rough) >= earned[best] else plans[best]
+        if self._several:
+            flight = max(settled(self.scenario, self.mode_rule, flight), key=self.expected)
         return Seen(*(each[best : best + 1] for each in ways)), flight
 
     @torch.no_grad()
