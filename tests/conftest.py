@@ -31,6 +31,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "__main__.py"
 
 torch.set_num_threads(1)
 os.environ["OMP_NUM_THREADS"] = "1"  # of the processes that tests start
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # nor shall each of them compile all sources
 os.environ["TORCHINDUCTOR_DEBUG_COMPILE"] = "1"  # without optimizing, which takes half the time
 Options._drop_tables_default += ["GDEF", "GPOS", "GSUB"]  # of fonts; no PDF needs what takes long
 gc.freeze()  # or each search for garbage would go through all libraries

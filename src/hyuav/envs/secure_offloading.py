@@ -259,9 +259,10 @@ class SecureOffloadingEnv(EnvBase):
         position = self.start(tensordict)
         # What is found at the start is what a slot brings in which the helpers stay there.
         staying = Control(torch.zeros_like(position), self._mode_rule)
-        after_reset = self._slot(self._nodes(self.drawn_layouts(), position), staying)[0]
+        observed, *_ = self._slot(self._nodes(self.drawn_layouts(), position), staying)
         if self.diagnostics:
-            after_reset["diagnostics"] = self.observation_spec["diagnostics"].zero()
+            observed["diagnostics"] = self.observation_spec["diagnostics"].zero()
+        after_reset = TensorDict(observed, self.batch_size, device=self.device)
         chosen = None if tensordict is None else tensordict.get("_reset", None)
         self.recorder.start(after_reset, chosen)
         return after_reset
@@ -312,37 +313,35 @@ class SecureOffloadingEnv(EnvBase):
             raise InputTypeError(rejection("action", action.dtype, "real numbers"))
         action = action.to(torch.float32)  # as specified, whatever is given
         control = self.physics.control(action, self._norm_limit, self._mode_rule)
-        after, outcome, tasks = self._slot(self._nodes(tensordict, position), control)
-        after["reward"] = reward = self.reward.of(outcome).to(outcome.sum_rate.dtype)
-        after["done"] = torch.zeros_like(reward, dtype=torch.bool)
-        after["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
+        entries, outcome, tasks = self._slot(self._nodes(tensordict, position), control)
+        entries["reward"] = reward = self.reward.of(outcome).to(outcome.sum_rate.dtype)
+        entries["done"] = torch.zeros_like(reward, dtype=torch.bool)
+        entries["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
         if self.diagnostics:
             assert tasks is not None
             edge_load = tensordict["diagnostics", "edge_load"]
-            after["diagnostics"] = diagnose(self.scenario, outcome, tasks, edge_load)
+            entries["diagnostics"] = diagnose(self.scenario, outcome, tasks, edge_load)
+        after = TensorDict(entries, self.batch_size, device=self.device)
         if isinstance(self.draws, Draws):  # else a graph is recorded, and nothing is flown
             self.recorder.add(after)
         return after
 
     def _slot(
         self, nodes: Nodes, control: Control
-    ) -> tuple[TensorDictBase, SlotOutcome, Tasks | None]:
+    ) -> tuple[dict[str, Any], SlotOutcome, Tasks | None]:
         """Fly one slot: what is observed, what the slot brought, and its tasks."""
         fading = self.draws.fading()
         tasks = self.draws.tasks() if self.draws_tasks else None
         links = None if fading is None else self.physics.link_row.unflatten(fading)
         outcome = slot(self.physics, nodes, control, links, tasks)
-        observed = TensorDict(
-            position=outcome.nodes.helper,
-            mode=outcome.relays.to(torch.int64),
-            distances=outcome.distances,
-            off_map=outcome.off_map,
+        observed: dict[str, Any] = {
+            "position": outcome.nodes.helper,
+            "mode": outcome.relays.to(torch.int64),
+            "distances": outcome.distances,
+            "off_map": outcome.off_map,
             **self.node_entries(outcome.nodes),
-            batch_size=self.batch_size,
-            device=self.device,
-        )
-        for name in self._entries:
-            observed[name] = getattr(outcome, name)
+            **{name: getattr(outcome, name) for name in self._entries},
+        }
         if self.tells_fading:
             observed["fading"] = self.observation_spec["fading"].one() if fading is None else fading
         return observed, outcome, tasks
