@@ -259,7 +259,7 @@ class SecureOffloadingEnv(EnvBase):
         position = self.start(tensordict)
         # What is found at the start is what a slot brings in which the helpers stay there.
         staying = Control(torch.zeros_like(position), self._mode_rule)
-        observed, *_ = self._slot(self._nodes(self.drawn_layouts(), position), staying)
+        observed = self._slot(self._nodes(self.drawn_layouts(), position), staying)[0]
         if self.diagnostics:
             observed["diagnostics"] = self.observation_spec["diagnostics"].zero()
         after_reset = TensorDict(observed, self.batch_size, device=self.device)
