@@ -49,7 +49,7 @@ class SeveralHelpers:
     """The best flights of several helpers that are found.
 
     Args:
-        physics: in float64.
+        physics: of the scenario, in float64, or in float32 where rough flights will do.
         resolution: spacing in m of the grid on which flights end.
         power_step: between the levels of power in dB.
         draws: of a slot's fading and tasks that the expected reward is averaged over.

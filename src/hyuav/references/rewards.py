@@ -23,7 +23,7 @@ class ExpectedReward:
     """The expected reward of a slot with helpers anywhere.
 
     Args:
-        physics: in float64.
+        physics: of the scenario, in float64, or in float32 where rough numbers will do.
         draws: of fading and tasks that are averaged over, the same everywhere and stratified; 1
             leaves fading out.
         generator: of the draws.
