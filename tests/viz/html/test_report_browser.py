@@ -131,11 +131,12 @@ def test_every_scheme_can_be_chosen(report: Path) -> None:
 def test_playing_moves_on_and_the_slider_may_be_moved_meanwhile(report: Path) -> None:
     with opened(report, DESKTOP) as page:
         page.get_by_text("▶ Play").click()
-        page.locator(TITLE, has_text="slot 3 of 12").wait_for()
+        # Any of several slots, since a busy machine may be seen to leave one out.
+        page.locator(TITLE, has_text=re.compile("slot [3-9] of 12")).wait_for()
         _slide(page, 0.98)
         page.locator(TITLE, has_text="slot 12 of 12").wait_for()
         page.get_by_text("▶ Play").click()  # from the first slot again
-        page.locator(TITLE, has_text="slot 2 of 12").wait_for()
+        page.locator(TITLE, has_text=re.compile("slot [2-9] of 12")).wait_for()
         page.get_by_text("Pause").click()
 
 
