@@ -1,10 +1,8 @@
 """Words that a recipe does not have: the line says which may have been meant, and where."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
-from hydra._internal.hydra import Hydra
 
 from recipe_calls import Refusal
 
@@ -95,17 +93,3 @@ def test_a_training_in_the_way_is_told_how_to_go_on_with(refusal: Refusal, tmp_p
     (tmp_path / "run" / "config.yaml").write_text("learners: []\n")
     told = refusal("train", "hydra.run.dir=run")
     assert told.endswith("a run in it (train resume=DIRECTORY goes on with one)\n")
-
-
-def test_the_words_are_composed_once(refusal: Refusal, monkeypatch: pytest.MonkeyPatch) -> None:
-    composed, compose = [], Hydra.compose_config
-
-    def count(*given: Any, **more: Any) -> Any:
-        composed.append(more["overrides"])
-        return compose(*given, **more)
-
-    monkeypatch.setattr(Hydra, "compose_config", count)
-    assert "expected a run directory" in refusal("evaluate", "run=nowhere")
-    assert len(composed) == 1
-    assert "expected a run directory" in refusal("evaluate", "run=nowhere", "hydra.mode=RUN")
-    assert len(composed) == 3

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import hydra
-from hydra._internal.hydra import Hydra
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
@@ -134,27 +133,11 @@ def recipe(
                     register(groups)
                 read_files_as_data(groups, _completed)
                 vocabulary().refuse(sys.argv[1:])
-                with _composing_once():
-                    hydra.main(version_base=None, config_path=None, config_name=name)(run)()
+                hydra.main(version_base=None, config_path=None, config_name=name)(run)()
 
         return command
 
     return decorate
-
-
-@contextmanager
-def _composing_once() -> Iterator[None]:
-    """Let Hydra not compose the configuration twice, first to look for ``hydra.mode``.
-
-    That may stand on the command line alone, since no file tells Hydra what to do.
-    """
-    look = Hydra.get_mode
-    if not any("hydra.mode" in argument for argument in sys.argv[1:]):
-        Hydra.get_mode = lambda *_, **__: None  # type: ignore[method-assign]
-    try:
-        yield
-    finally:
-        Hydra.get_mode = look  # type: ignore[method-assign]
 
 
 @contextmanager
