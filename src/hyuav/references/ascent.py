@@ -14,7 +14,7 @@ from torch import Tensor
 from hyuav.physics.modes import allowed_vectors
 from hyuav.physics.slot import Physics
 from hyuav.references.joint import Plan
-from hyuav.references.rewards import is_random, stratified_fading, sum_rates, tasks_of
+from hyuav.references.rewards import ExpectedReward
 
 STEPS = 100
 """Of gradient ascent (Adam)."""
@@ -47,10 +47,7 @@ class Ascent:
 
     def __init__(self, physics: Physics, mode_rule: str, draws: int, seed: int) -> None:
         self._physics = physics
-        self._draws = draws if is_random(physics) else 1
-        generator = torch.Generator().manual_seed(seed)
-        self._fading = stratified_fading(physics, self._draws, generator)
-        self._tasks = tasks_of(physics, (self._draws,), generator)
+        self._expected = ExpectedReward(physics, draws, torch.Generator().manual_seed(seed))
         self._vectors = allowed_vectors(mode_rule, physics.scenario.num_helpers)
         limit = physics.norm_limit([mode_rule])
         self._norm_limit = None if limit is None else limit[0]
@@ -116,14 +113,6 @@ class Ascent:
         rewards = places.new_zeros(len(own))
         for mode in own.unique().tolist():
             slots = (own == mode).nonzero().squeeze(-1)
-            rates = sum_rates(
-                self._physics,
-                [self._vectors[mode]],
-                places[slots].unsqueeze(1),
-                (len(slots), self._draws),
-                self._fading,
-                self._tasks,
-                shares[slots].unsqueeze(1),
-            )
+            rates = self._expected.drawn([self._vectors[mode]], places[slots], shares[slots])
             rewards = rewards.index_add(0, slots, rates[0].mean(dim=-1))
         return rewards.reshape(modes.shape)

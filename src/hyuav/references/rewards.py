@@ -50,17 +50,29 @@ class ExpectedReward:
         several = 4 ** (scenario.num_helpers - 1)
         chunk = max(CHUNK // (self._draws * scenario.num_ues * several), 1)
         parts = places.split(chunk)
-        powers = [None] * len(parts) if power is None else power.unsqueeze(1).split(chunk)
+        powers = [None] * len(parts) if power is None else power.split(chunk)
         allowed = [allowed_vectors(rule, scenario.num_helpers) for rule in mode_rules]
         vectors = sorted({vector for own in allowed for vector in own})
         for part, own_power, out in zip(parts, powers, means.split(chunk, dim=1), strict=True):
-            shape = len(part), self._draws
-            drawn = self._fading, self._tasks
-            sums = sum_rates(self.physics, vectors, part.unsqueeze(1), shape, *drawn, own_power)
+            sums = self.drawn(vectors, part, own_power)
             for own, mean in zip(allowed, out, strict=True):
                 best = sums.amax(dim=0) if len(own) > 1 else sums[vectors.index(own[0])]
                 torch.mean(best, dim=-1, out=mean)
         return means
+
+    def drawn(
+        self, vectors: Sequence[tuple[bool, ...]], places: Tensor, power: Tensor | None = None
+    ) -> Tensor:
+        """What slots bring in given modes in each draw: (modes, P, draws) bps/Hz, differentiable.
+
+        Args:
+            vectors: the modes.
+            places: (P, H, 2) m, like the next as above.
+            power: (P, H).
+        """
+        own = None if power is None else power.unsqueeze(1)
+        shape, drawn = (len(places), self._draws), (self._fading, self._tasks)
+        return sum_rates(self.physics, vectors, places.unsqueeze(1), shape, *drawn, own)
 
     def of_flight(self, mode_rule: str, path: Tensor, power: Tensor) -> float:
         """What a flight (T + 1, H, 2) m with powers (T, H) brings under a mode rule, in bps/Hz."""

@@ -69,8 +69,7 @@ class Plan(NamedTuple):
         """The best rough flight that is found."""
         physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
         spacing, draws = coarseness(scenario)
-        if scenario.num_helpers > 1:
-            draws = shared_draws(scenario, mode_rule, draws)
+        draws = shared_draws(scenario, mode_rule, draws)
         anywhere = SeveralHelpers(
             physics, spacing, POWER_STEP, draws, seed=0, window=scenario.map_side
         )

@@ -76,10 +76,11 @@ class GeneralistPolicy(TensorDictModuleBase):
         self.network, self.scenario, self.mode_rule = network, scenario, mode_rule
         self._several = scenario.num_helpers > 1
         self._rough = Plan.roughly_best(scenario, mode_rule)
+        few, several = (
+            shared_draws(scenario, mode_rule, count) for count in (ROUGH_DRAWS, DRAWS_OF_SEVERAL)
+        )
         draws = DRAWS if scenario.power_control else 4 * DRAWS
-        few, several = ROUGH_DRAWS, DRAWS_OF_SEVERAL
         if self._several:
-            few, several = (shared_draws(scenario, mode_rule, own) for own in (few, several))
             draws = few
         scenes = scenes_of(scenario, mode_rule, draws, self._rough.at_the_end)
         self.world = World(scenes, Tokens.of([scenario] * scenes.count))
