@@ -49,8 +49,7 @@ def test_the_limit_reaches_every_kind_of_batch(
     make_vec: Build, mode: str, limit: int | None
 ) -> None:
     given = {} if limit is None else {"max_episode_steps": limit}
-    number = 1 if mode == "async" else 2  # each begins in a process that loads everything
-    env = make_vec(number, TEN, vectorization_mode=mode, **given)
+    env = make_vec(2, TEN, vectorization_mode=mode, **given)
     assert slots_of(env) == (limit or 10)
     env.close()
 
