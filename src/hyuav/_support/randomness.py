@@ -41,8 +41,8 @@ def uniform(bits: Tensor) -> Tensor:
 
 def polar(bits: Tensor, dtype: torch.dtype = torch.float32) -> tuple[Tensor, Tensor]:
     """A level in (0, 1] and an angle in rad, uniform both, from 64 random bits each: (...)."""
-    # 31 bits decide the level, so that the smallest is well below float32's 2^-24.
-    level = ((bits >> 32 & 0x7FFFFFFF).to(dtype) + 0.5) * 2.0**-31
+    # 31 bits decide the level, so that the smallest is well below float32's 2^-24: bits 32 to 62.
+    level = ((bits & 0x7FFFFFFF << 32).to(dtype) + 2.0**31) * 2.0**-63
     angle = (bits & 0xFFFFFFFF).to(dtype) * (2.0 * math.pi * 2.0**-32)
     return level, angle
 

@@ -67,10 +67,10 @@ class Draws:
             self._places[name] = columns * GAMMA, helpers * width * GAMMA, inner.numel() * width
         trailing = (1,) * self._rank
         self._law = RicianFading.of(physics.k_factor.reshape(-1, *trailing))
-        # Tensors, so that a graph that torch.compile makes of a slot counts on; where a GPU need
+        # A tensor, so that a graph that torch.compile makes of a slot counts on; where a GPU need
         # not be waited for.
-        self._slots = dict.fromkeys(self._names, _count(0))
-        self._blocks: dict[str, tuple[int, Tensor]] = {}
+        self._slots = torch.zeros(len(self._names), dtype=torch.int64, device="cpu")
+        self._blocks: dict[str, tuple[int, tuple[Tensor, ...]]] = {}
 
     def _tensor(self, values: object) -> Tensor:
         return torch.tensor(values, device=self._physics.device)
@@ -98,9 +98,9 @@ class Draws:
 
     def ticket(self, *, tasks: bool) -> tuple[Tensor, Tensor]:
         """What decides the next slot's fading and, if wanted, tasks; it counts as drawn."""
-        slots = torch.stack([*self._slots.values()]).to(self._keys.device)
+        slots = self._slots.to(self._keys.device, copy=True)
         for name, drawn in (("fading", self._physics.scenario.fading), ("tasks", tasks)):
-            self._slots[name] = self._slots[name] + int(drawn)
+            self._count(name, int(drawn))
         return self._keys, slots
 
     def redeem(self, keys: Tensor, slots: Tensor) -> tuple[Tensor | None, Tasks]:
@@ -112,19 +112,20 @@ class Draws:
 
     def state(self) -> dict[str, Any]:
         """Where the random numbers stand, for :meth:`set_state`."""
-        return {"keys": self._keys.cpu(), **{name: int(own) for name, own in self._slots.items()}}
+        slots = dict(zip(self._names, self._slots.tolist(), strict=True))
+        return {"keys": self._keys.cpu(), **slots}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Continue where :meth:`state` was taken from draws of as many distinct seeds."""
         self._keys = state["keys"].to(self._keys.device).reshape(self._keys.shape)
-        self._slots = {name: _count(int(state[name])) for name in self._names}
+        self._slots = torch.tensor([int(state[name]) for name in self._names], device="cpu")
         self._blocks.clear()
 
     def _spread(self, numbers: Tensor) -> Tensor:
-        """From the numbers of D seeds (..., D, *inner, k) to the batch's (..., *batch_size, k)."""
-        axis = numbers.ndim - 1 - self._rank
+        """From what :meth:`_numbers` gives to the batch's (..., *batch_size, k)."""
         if self.rows is None:
-            return numbers.squeeze(axis)
+            return numbers
+        axis = numbers.ndim - 1 - self._rank
         seeds, rows = numbers.shape[axis], len(self.rows)
         if seeds == rows:
             return numbers
@@ -134,23 +135,27 @@ class Draws:
 
     def _next(self, name: str) -> Tensor:
         """The next slot's numbers, several slots of which are drawn at once, but in a graph."""
-        slots = self._slots[name]
         if torch.compiler.is_compiling():
-            self._slots[name] = slots + 1
-            numbers = self._numbers(name, self._keys[self._names.index(name)], slots)
-            return numbers.contiguous()  # as they are without a graph, or there would be two
-        block, place = divmod(int(slots), self._at_once)
-        drawn, numbers = self._blocks.get(name, (-1, self._keys))
+            number = self._names.index(name)
+            numbers = self._numbers(name, self._keys[number], self._slots[number]).contiguous()
+            self._slots[number] += 1
+            return numbers  # as they are without a graph, or there would be two
+        block, place = divmod(self._count(name, 1), self._at_once)
+        drawn, slots = self._blocks.get(name, (-1, ()))
         if drawn != block:
-            numbers = self._of_slots(name, block * self._at_once, self._at_once)
-            self._blocks[name] = block, numbers
-        self._slots[name] = slots + 1
-        return numbers[place]
+            slots = self._of_slots(name, block * self._at_once, self._at_once).unbind()
+            self._blocks[name] = block, slots
+        return slots[place]
 
     def _take(self, name: str, count: int) -> Tensor:
-        numbers = self._of_slots(name, int(self._slots[name]), count)
-        self._slots[name] = self._slots[name] + count
-        return numbers
+        return self._of_slots(name, self._count(name, count), count)
+
+    def _count(self, name: str, slots: int) -> int:
+        """Count slots as drawn, and tell how many were before."""
+        counts, number = self._slots.numpy(), self._names.index(name)  # faster than the tensor
+        drawn = int(counts[number])
+        counts[number] += slots
+        return drawn
 
     def _of_slots(self, name: str, first: int, count: int) -> Tensor:
         slots = torch.arange(first, first + count, device=self._keys.device)
@@ -160,7 +165,8 @@ class Draws:
     def _numbers(self, name: str, keys: Tensor, slots: Tensor) -> Tensor:
         """Fading powers or uniform numbers (..., D, *inner, width) of slots (..., 1, *1).
 
-        The helpers are the last dimension until the end: a long loop for a compiler.
+        The axis of D seeds is left out where one is for all rows. The helpers are the last
+        dimension until the end: a long loop for a compiler.
         """
         column, helper, per_slot = self._places[name]
         bits = splitmix64(helper + (keys + slots * per_slot * GAMMA) + column)
@@ -168,14 +174,11 @@ class Draws:
             numbers = self._law.power(*polar(bits, self._physics.dtype))
         else:
             numbers = uniform(bits).to(self._physics.dtype)
-        return numbers.movedim(-1 - self._rank, -1)
+        numbers = numbers.movedim(-1 - self._rank, -1)
+        return numbers.squeeze(-1 - self._rank) if self.rows is None else numbers
 
     def _as_tasks(self, levels: Tensor) -> Tasks:
         return tasks_at(self._physics.scenario, *levels.chunk(2, dim=-1))
-
-
-def _count(slots: int) -> Tensor:
-    return torch.tensor(slots, dtype=torch.int64, device="cpu")
 
 
 class GivenDraws:

@@ -17,7 +17,7 @@ class FlightRecorder:
     """The flights of the first rows of a batch since their last reset, for pictures of them.
 
     What is kept stays on its device until a picture is drawn. Of a batch that is kept whole it is
-    what the environment returned, not a copy, so that a slot costs nothing.
+    what the environment returned, not a copy, so that a slot costs next to nothing.
 
     Args:
         rows: how many rows to keep; those of a batch of several dimensions count through all.
@@ -26,7 +26,9 @@ class FlightRecorder:
 
     def __init__(self, rows: int, num_slots: int) -> None:
         self.rows = rows
-        self._slots: deque[TensorDictBase] = deque(maxlen=min(num_slots, MOST_SLOTS) + 1)
+        self._slots: deque[dict[str, Tensor]] = deque(maxlen=min(num_slots, MOST_SLOTS) + 1)
+        self._names: list[str] = []
+        """Of the entries that are drawn."""
         self._count = 0
         """Of the slots flown since all rows were reset."""
         self._begun: list[int] = []
@@ -39,15 +41,20 @@ class FlightRecorder:
             entries: (*B,), what is observed at the start.
             chosen: (*B, 1) bool, the rows that begin anew; the others fly on.
         """
+        names = "position", "mode", *NODES
+        self._names = [name for name in names if entries.get(name, None) is not None]
         begun = self._first_rows(entries)
-        rows = begun.numel()
+        rows = len(begun["position"])
         if chosen is None or not self._slots:
             self._slots.clear()
             self._count, self._begun = 0, [0] * rows
         else:
             anew = chosen.reshape(-1)[:rows]
-            last = _in_rows(self._slots.pop())
-            begun = _in_rows(begun).where(anew, last)
+            last = self._slots.pop()
+            begun = {
+                name: torch.where(anew.reshape(-1, *(1,) * (own.ndim - 1)), own, last[name])
+                for name, own in begun.items()
+            }
             pairs = zip(self._begun, anew.tolist(), strict=True)
             self._begun = [self._count if new else before for before, new in pairs]
         self._slots.append(begun)
@@ -72,7 +79,7 @@ class FlightRecorder:
             accepted = f"a row that is kept, 0 to {len(self._begun) - 1}"
             raise InputError(rejection("row", row, accepted))
         flown = self._count - self._begun[row]
-        slots = [_in_rows(entries) for entries in list(self._slots)[-1 - flown :]]
+        slots = list(self._slots)[-1 - flown :]
         positions, modes = (
             torch.stack([entries[name][row] for entries in slots]).detach().cpu()
             for name in ("position", "mode")
@@ -81,17 +88,14 @@ class FlightRecorder:
 
     def nodes(self, row: int) -> dict[str, list[list[float]]]:
         """Where the nodes that do not fly are in one row's episode, where they are drawn: in m."""
-        latest = _in_rows(self._slots[-1])
+        latest = self._slots[-1]
         return {name: own[row].tolist() for name, own in latest.items() if name in NODES}
 
-    def _first_rows(self, entries: TensorDictBase) -> TensorDictBase:
-        """What is kept of them."""
-        if entries.numel() <= self.rows:
-            return entries
-        kept = entries.select("position", "mode", *NODES, strict=False)
-        return kept.reshape(-1)[: self.rows].clone()
-
-
-def _in_rows(entries: TensorDictBase) -> TensorDictBase:
-    """The entries that are drawn, (rows,)."""
-    return entries.select("position", "mode", *NODES, strict=False).reshape(-1)
+    def _first_rows(self, entries: TensorDictBase) -> dict[str, Tensor]:
+        """The first rows of the entries that are drawn, each (rows, ...)."""
+        kept, dims = {}, entries.batch_dims
+        for name in self._names:
+            values = entries.get(name)
+            rows = values if dims == 1 else values.reshape(-1, *values.shape[dims:])
+            kept[name] = rows if len(rows) <= self.rows else rows[: self.rows].clone()
+        return kept

@@ -314,9 +314,9 @@ class SecureOffloadingEnv(EnvBase):
         action = action.to(torch.float32)  # as specified, whatever is given
         control = self.physics.control(action, self._norm_limit, self._mode_rule)
         entries, outcome, tasks = self._slot(self._nodes(tensordict, position), control)
-        entries["reward"] = reward = self.reward.of(outcome).to(outcome.sum_rate.dtype)
-        entries["done"] = torch.zeros_like(reward, dtype=torch.bool)
-        entries["terminated"] = torch.zeros_like(reward, dtype=torch.bool)
+        entries["reward"] = self.reward.of(outcome).to(outcome.sum_rate.dtype)
+        entries["done"] = torch.zeros_like(outcome.taken[0])  # (..., 1) bool, too
+        entries["terminated"] = torch.zeros_like(outcome.taken[0])
         if self.diagnostics:
             assert tasks is not None
             edge_load = tensordict["diagnostics", "edge_load"]
