@@ -13,8 +13,9 @@ def taken(rates: list[float], rule: ModeRule) -> int:
     """The number of the mode that is chosen for sum-rates in the order of the modes."""
     chosen, best = 0, torch.tensor([rates[0]])
     for number, rate in enumerate(rates[1:], start=1):
-        if beats(torch.tensor([rate]), best, rule, number):
-            chosen, best = number, torch.tensor([rate])
+        better, best = beats(torch.tensor([rate]), best, rule, number)
+        chosen = number if better else chosen
+    assert best.item() == torch.tensor(rates[chosen])
     return chosen
 
 

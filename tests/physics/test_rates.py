@@ -32,16 +32,20 @@ def gains_of(*values: float, dtype: torch.dtype = torch.float64) -> Links:
     return LinkRow(1, 1, 1).unflatten(row)
 
 
+def sent(gains: Links, ue: float, helper: float, noise: float) -> Sent:
+    """At powers in W, whatever the helper does."""
+    own, of_helper = (gains.ue_legitimate.new_tensor(power / noise) for power in (ue, helper))
+    return Sent(own, [of_helper], [of_helper])
+
+
 def relaying(gains: Links, ue: float, helper: float, noise: float) -> AchievableRates:
     """The rates through the one helper, at powers in W."""
-    power = [helper / noise]
-    return secrecy.relay_rates(gains, Sent(ue / noise, power, power), 0, [], "independent")
+    return secrecy.relay_rates(gains, sent(gains, ue, helper, noise), 0, [], "independent")
 
 
 def jamming(gains: Links, ue: float, helper: float, noise: float) -> AchievableRates:
     """The rates of the straight links while the one helper jams, at powers in W."""
-    power = [helper / noise]
-    return secrecy.straight_rates(gains, Sent(ue / noise, power, power), [0], "independent")
+    return secrecy.straight_rates(gains, sent(gains, ue, helper, noise), [0], "independent")
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])

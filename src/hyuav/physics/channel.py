@@ -41,11 +41,12 @@ class Links(NamedTuple):
         """These path gains times the fading powers; as they are where fading is off."""
         if fading is None:
             return self
-        return Links(*(gain * power for gain, power in zip(self, fading, strict=True)))
+        return Links(*map(torch.mul, self, fading))
 
     def to_legitimate(self, helper: int) -> Tensor:
         """The number of a helper's link to the legitimate UAV, (..., 1)."""
-        return self.helper_legitimate.narrow(-1, helper, 1)
+        alone = self.helper_legitimate.shape[-1] == 1
+        return self.helper_legitimate if alone else self.helper_legitimate.narrow(-1, helper, 1)
 
     def to_eavesdroppers(self, helper: int) -> Tensor:
         """The numbers of a helper's links to the eavesdroppers, (..., E)."""
@@ -143,7 +144,11 @@ def path_gain(
     Returns:
         (...) dimensionless.
     """
-    squared = (distance.square() + height_difference**2).clamp(min=REFERENCE_DISTANCE**2)
+    squared = distance.square()
+    if height_difference:
+        squared = squared + height_difference**2
+    if abs(height_difference) < REFERENCE_DISTANCE:
+        squared = squared.clamp(min=REFERENCE_DISTANCE**2)
     loss = squared if exponent == 2.0 else squared.pow(exponent / 2)
     return loss.reciprocal() * reference_gain
 

@@ -94,19 +94,23 @@ def allowed_vectors(mode_rule: str, num_helpers: int) -> tuple[tuple[bool, ...],
     return mode_vectors(num_helpers) if fixed is None else (fixed,)
 
 
-def beats(sum_rate: Tensor, best: Tensor, rule: ModeRule, mode: int) -> Tensor:
-    """The argmax of Algorithm 1, one mode after the other: True where this one is taken.
+def beats(sum_rate: Tensor, best: Tensor, rule: ModeRule, mode: int) -> tuple[Tensor, Tensor]:
+    """The argmax of Algorithm 1, one mode after the other.
 
-    It is where the sum-rate is larger than the best of the modes before it, so that of equals the
-    first is taken: a tie jams.
+    A mode is taken where its sum-rate is larger than the best of the modes before it, so that of
+    equals the first is taken: a tie jams.
 
     Args:
         sum_rate: C_k of this mode, (..., 1) bps/Hz.
         best: the largest of the modes before it that are allowed, (..., 1) bps/Hz.
         rule: that decides which are.
         mode: the number of this one.
+
+    Returns:
+        where it is taken, (..., 1) bool, and the best with it, (..., 1) bps/Hz.
     """
     better = sum_rate > best
     if rule.allowed is None:
-        return better
-    return (better | rule.forced[mode]) & rule.allowed[mode]
+        return better, torch.maximum(sum_rate, best)
+    taken = (better | rule.forced[mode]) & rule.allowed[mode]
+    return taken, torch.where(taken, sum_rate, best)

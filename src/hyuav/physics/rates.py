@@ -40,11 +40,11 @@ def spectral_efficiency(snr: Tensor, time_share: float = 1.0) -> Tensor:
 class Sent(NamedTuple):
     """What all nodes send at, in units of the noise power sigma^2."""
 
-    ue: float
-    """p_u / sigma^2."""
-    relay: Sequence[Tensor | float]
+    ue: Tensor
+    """p_u / sigma^2: a number, as a tensor since PyTorch multiplies by one faster."""
+    relay: Sequence[Tensor]
     """p_i / sigma^2 of each helper where it relays: H of (..., 1), or of all."""
-    jamming: Sequence[Tensor | float]
+    jamming: Sequence[Tensor]
     """p_j / sigma^2 of each helper where it jams, likewise."""
 
     def scaled(self, power: Sequence[Tensor]) -> "Sent":
@@ -127,7 +127,7 @@ def secrecy_rate(rates: AchievableRates) -> Tensor:
     A difference of logarithms is the logarithm of a ratio: one is faster than two, and no digits
     cancel where both rates are large.
     """
-    gap = (rates.legitimate_snr - rates.eavesdropper_snr).clamp(min=0.0)
+    gap = (rates.legitimate_snr - rates.eavesdropper_snr).relu()
     return spectral_efficiency(gap / (1.0 + rates.eavesdropper_snr), rates.time_share)
 
 

@@ -75,9 +75,11 @@ class Physics:
         self.device = torch.device(device) if device is not None else torch.device("cpu")
         self.dtype = dtype
         self.nodes = Nodes.of(scenario, self.device, dtype) if nodes is None else nodes
+        self._counts = scenario.num_ues, 1, scenario.num_eavesdroppers
         self.link_row = LinkRow.of(scenario)
         self.k_factor = self._k_factor()
         """Of all links, (link_row.size,), as power ratios."""
+        self._no_links = self._tensor([])
         self._sent = self._nominal()
         self.mode_vectors = [
             torch.tensor(vector, device=self.device)
@@ -104,7 +106,7 @@ class Physics:
     def _nominal(self) -> rates.Sent:
         scenario = self.scenario
         powers = scenario.ue_power, scenario.relay_power, scenario.jamming_power
-        ue, relay, jamming = (power / scenario.noise_power for power in powers)
+        ue, relay, jamming = (self._tensor(power / scenario.noise_power) for power in powers)
         return rates.Sent(ue, (relay,) * scenario.num_helpers, (jamming,) * scenario.num_helpers)
 
     def _stand(self, nodes: Nodes) -> StandingNodes:
@@ -145,8 +147,7 @@ class Physics:
 
     def by_role(self, distances: Tensor) -> tuple[Tensor, ...]:
         """The parts of :meth:`distances`: to the UEs (..., U), to L (..., 1), the rest (..., E)."""
-        counts = self.scenario.num_ues, 1, self.scenario.num_eavesdroppers
-        return tuple(distances.split_with_sizes(counts, dim=-1))
+        return tuple(distances.split_with_sizes(self._counts, dim=-1))
 
     def geometry(self, nodes: Nodes) -> Geometry:
         """Distances and path gains (eq. 3 and 4 without fading) of all links."""
@@ -168,7 +169,7 @@ class Physics:
     def _between_helpers(self, helper: Tensor) -> Tensor:
         """Path gains of the links between helpers (..., H, 2) m, at equal altitude."""
         if self.scenario.num_helpers == 1:
-            return helper[..., :0, 0]
+            return self._no_links
         first, second = zip(*channel.pairs(self.scenario.num_helpers), strict=True)
         distance = channel.horizontal_distance(helper[..., first, :], helper[..., second, :])
         return channel.air_to_air(self.scenario, distance, 0.0)
@@ -285,7 +286,7 @@ class Physics:
         for helper, relaying in enumerate(relays):
             if relaying:
                 through = rates.relay_rates(gains, sent, helper, jammers, kind)
-                distance = geometry.ue_to_helper[..., helper]
+                distance = geometry.ue_to_helper.select(-1, helper)
                 near = offloading.covered(distance, self.scenario.coverage_radius)
                 allowed = near & geometry.standing.may_be_relayed
                 ways.append((helper + 1, rates.secrecy_rate(through), allowed))
@@ -349,10 +350,9 @@ def chosen(
     taken = []
     best, relays = outcomes[0].sum_rate.unsqueeze(-1), physics.mode_vectors[0]
     for number, outcome in enumerate(outcomes[1:], start=1):
-        sum_rate = outcome.sum_rate.unsqueeze(-1)
-        taken.append(modes.beats(sum_rate, best, control.mode_rule, number))
-        best = torch.where(taken[-1], sum_rate, best)
-        relays = torch.where(taken[-1], physics.mode_vectors[number], relays)
+        better, best = modes.beats(outcome.sum_rate.unsqueeze(-1), best, control.mode_rule, number)
+        relays = torch.where(better, physics.mode_vectors[number], relays)
+        taken.append(better)
     return SlotOutcome(
         nodes,
         control,
