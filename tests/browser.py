@@ -83,13 +83,6 @@ def window(context: BrowserContext, width: int, height: int) -> Iterator[Browser
         opened.page.close()
 
 
-@contextmanager
-def browser_page(width: int, height: int) -> Iterator[BrowserPage]:
-    """Open a window of a browser of its own."""
-    with browser() as context, window(context, width, height) as opened:
-        yield opened
-
-
 def _watch(opened: BrowserPage) -> None:
     def answer(route: Route) -> None:
         address = urlsplit(route.request.url)

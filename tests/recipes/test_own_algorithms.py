@@ -19,6 +19,15 @@ class Own(DDPG):
     boldness: NonNegativeNumber = parameter(2.0)
 """
 
+SERVED = """
+from hyuav import Reward
+
+def _served(slot):
+    return slot.offloading.float().mean(dim=-1, keepdim=True)
+
+served = Reward(_served, unit="share of UEs")
+"""
+
 SHORT = [*TINY, "training.compile=never", "scenario.num_slots=6"]
 
 
@@ -62,13 +71,18 @@ def test_jobs_of_a_multirun_may_name_it(call: Call, tmp_path: Path, own: str) ->
     assert names == ["0_two_clusters_ddpg_0", "1_two_clusters_own_Own_0"]
 
 
-def test_workers_of_a_comparison_run_it_too(call: Call, tmp_path: Path, own: str) -> None:
+def test_workers_of_a_comparison_run_it_and_a_reward_of_ones_own(
+    call: Call, tmp_path: Path, own: str
+) -> None:
+    (tmp_path / "mine" / "rewards.py").write_text(SERVED)
     few = [each for each in TINY_COMPARISON if not each.startswith("workers=")]
     asked = ["scenario=two_clusters", "scheme=hybrid", *few, "workers=2"]
-    call("compare", f"algorithm=[{own}]", *asked)
+    call("compare", f"algorithm=[{own}]", "reward=mine/rewards.py:served", *asked)
     results = pd.read_parquet(tmp_path / "here" / "results.parquet")
     assert set(results["algorithm"]) == {"own.py:Own"}
     assert (tmp_path / "here" / "shards" / "own_Own_two_clusters_T8").exists()
+    assert (results["earned"] <= 8.0).all()
+    assert (results["fraction"] == results["earned"] / results["optimum"]).all()
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import pytest
 
 from hyuav.experiments.run_directory import RunDirectory
-from recipe_calls import TINY, TINY_COMPARISON, Call, Refusal, forget_own
+from recipe_calls import TINY, Call, Refusal, forget_own
 
 PROGRAM = """
 from hyuav import Reward
@@ -94,15 +93,6 @@ def test_without_an_optimum_one_sentence_says_so(
     assert set(schemes) == {"proposed", "re_lt", "ja_lt", "no_helper"} & set(schemes)
     assert "fraction_of_optimum" not in schemes["proposed"]
     assert "bps/Hz" not in (run / "report.html").read_text().partition("Learning curves")[2][:400]
-
-
-def test_workers_of_a_comparison_run_it_too(call: Call, tmp_path: Path, own: str) -> None:
-    few = [each for each in TINY_COMPARISON if not each.startswith("workers=")]
-    asked = ["scenario=two_clusters", "scheme=hybrid", *few, "workers=2"]
-    call("compare", "algorithm=ddpg", f"reward={own}", *asked)
-    results = pd.read_parquet(tmp_path / "here" / "results.parquet")
-    assert (results["earned"] <= 8.0).all()
-    assert (results["fraction"] == results["earned"] / results["optimum"]).all()
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,14 @@
 import re
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import BrowserContext, Page
 
-from browser import DESKTOP, PHONE, browser_page, needs_chromium
+from browser import DESKTOP, PHONE, browser, needs_chromium, window
 from hyuav.experiments.comparison.plan import PIECES
 from hyuav.experiments.comparison.shards import CURVES_FILE, RESULTS_FILE
 from hyuav.experiments.metrics import METRIC_COLUMNS
@@ -59,18 +59,33 @@ def report(evaluated: RunDirectory) -> Path:
     return write_report(evaluated.path)
 
 
-@contextmanager
-def opened(path: Path, screen: tuple[int, int]) -> Iterator[Page]:
-    """The report, all of its figures drawn; at the end nothing may have gone wrong."""
-    with browser_page(*screen) as browser:
-        page = browser.page
-        page.goto(path.as_uri())
-        page.wait_for_function(
-            "[...document.querySelectorAll('figure.picture')].every((own) => own.dataset.drawn)"
-        )
-        yield page
-        assert browser.errors == []
-        assert browser.refused == []
+Opened = Callable[[Path, tuple[int, int]], AbstractContextManager[Page]]
+
+
+@pytest.fixture(scope="module")
+def context() -> Iterator[BrowserContext]:
+    """A browser for all tests of this file."""
+    with browser() as context:
+        yield context
+
+
+@pytest.fixture
+def opened(context: BrowserContext) -> Opened:
+    """Open a report, all of its figures drawn; at the end nothing may have gone wrong."""
+
+    @contextmanager
+    def open_report(path: Path, screen: tuple[int, int]) -> Iterator[Page]:
+        with window(context, *screen) as watched:
+            page = watched.page
+            page.goto(path.as_uri())
+            page.wait_for_function(
+                "[...document.querySelectorAll('figure.picture')].every((own) => own.dataset.drawn)"
+            )
+            yield page
+            assert watched.errors == []
+            assert watched.refused == []
+
+    return open_report
 
 
 def _width(page: Page) -> int:
@@ -97,7 +112,7 @@ def _filled(page: Page) -> int:
 
 @BOTH
 def test_the_slider_shows_each_slot_as_it_was_flown(
-    screen: tuple[int, int], evaluated: RunDirectory, report: Path
+    screen: tuple[int, int], evaluated: RunDirectory, report: Path, opened: Opened
 ) -> None:
     flights = readable_flights(evaluated.path)
     assert flights is not None
@@ -117,7 +132,7 @@ def test_the_slider_shows_each_slot_as_it_was_flown(
         assert page.evaluate(MISPLACED) == []
 
 
-def test_every_scheme_can_be_chosen(report: Path) -> None:
+def test_every_scheme_can_be_chosen(report: Path, opened: Opened) -> None:
     with opened(report, PHONE) as page:
         select = page.get_by_label("Flight").locator("select")
         names = select.locator("option").all_text_contents()
@@ -128,7 +143,9 @@ def test_every_scheme_can_be_chosen(report: Path) -> None:
             page.locator(TITLE, has_text=f"{name}, slot 1 of 12").wait_for()
 
 
-def test_playing_moves_on_and_the_slider_may_be_moved_meanwhile(report: Path) -> None:
+def test_playing_moves_on_and_the_slider_may_be_moved_meanwhile(
+    report: Path, opened: Opened
+) -> None:
     with opened(report, DESKTOP) as page:
         page.get_by_text("▶ Play").click()
         # Any of several slots, since a busy machine may be seen to leave one out.
@@ -142,7 +159,7 @@ def test_playing_moves_on_and_the_slider_may_be_moved_meanwhile(report: Path) ->
 
 @BOTH
 def test_an_unevaluated_run_is_flown_and_nothing_is_misplaced(
-    screen: tuple[int, int], trained: RunDirectory, copied: Copy
+    screen: tuple[int, int], trained: RunDirectory, copied: Copy, opened: Opened
 ) -> None:
     with opened(write_report(copied(trained).path), screen) as page:
         assert _width(page) == screen[0]
@@ -153,7 +170,7 @@ def test_an_unevaluated_run_is_flown_and_nothing_is_misplaced(
         assert table.all_text_contents() == ["Proposed", "Re-OT", "Re-LT", "Ja-LT", "No helper"]
 
 
-def test_hostile_names_stay_text(evaluated: RunDirectory, copied: Copy) -> None:
+def test_hostile_names_stay_text(evaluated: RunDirectory, copied: Copy, opened: Opened) -> None:
     run = copied(evaluated)
     config = run.config_file.read_text()
     quoted = HOSTILE.replace('"', '\\"')
@@ -190,7 +207,11 @@ def _long(run: RunDirectory) -> None:
     ],
 )
 def test_a_run_in_any_state_opens(
-    damage: Callable[[RunDirectory], None], told: str, trained: RunDirectory, copied: Copy
+    damage: Callable[[RunDirectory], None],
+    told: str,
+    trained: RunDirectory,
+    copied: Copy,
+    opened: Opened,
 ) -> None:
     run = copied(trained)
     damage(run)
@@ -201,7 +222,7 @@ def test_a_run_in_any_state_opens(
 
 
 @pytest.mark.parametrize("folder", ["", "shards"], ids=["run", "comparison"])
-def test_an_empty_directory_opens(folder: str, tmp_path: Path) -> None:
+def test_an_empty_directory_opens(folder: str, tmp_path: Path, opened: Opened) -> None:
     (tmp_path / "empty" / folder).mkdir(parents=True)
     with opened(write_report(tmp_path / "empty"), PHONE) as page:
         notes = page.locator(".note").all_text_contents()
@@ -209,7 +230,9 @@ def test_an_empty_directory_opens(folder: str, tmp_path: Path) -> None:
 
 
 @BOTH
-def test_an_ablation_with_many_pieces_is_legible(tmp_path: Path, screen: tuple[int, int]) -> None:
+def test_an_ablation_with_many_pieces_is_legible(
+    tmp_path: Path, screen: tuple[int, int], opened: Opened
+) -> None:
     entries = ["ddpg_robust", *(f"ddpg_robust-{piece}" for piece in PIECES)]
     learner = {"scenario": "two_clusters", "scheme": "hybrid", "num_slots": 10, "seed": 0}
     rows = [
@@ -230,7 +253,7 @@ def test_an_ablation_with_many_pieces_is_legible(tmp_path: Path, screen: tuple[i
         assert legend.count() == len(entries) + 1
 
 
-def test_a_comparison_opens(call: Call, tmp_path: Path) -> None:
+def test_a_comparison_opens(call: Call, tmp_path: Path, opened: Opened) -> None:
     asked = ("algorithm=[ddpg,sac]", "scenario=two_clusters", "scheme=[hybrid,relay]")
     call("compare", *asked, *TINY_COMPARISON)
     here = tmp_path / "here"
