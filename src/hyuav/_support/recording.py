@@ -20,7 +20,7 @@ from torch._dynamo.exc import BackendCompilerFailed
 from torch._functorch.compile_utils import fx_graph_cse
 from torch._guards import TracingContext, tracing
 from torch._inductor.custom_graph_pass import CustomGraphPass, get_hash_for_files
-from torch._inductor.exc import InductorError
+from torch._inductor.exc import InductorError, InvalidCxxCompiler
 from torch._subclasses.fake_tensor import FakeTensorMode
 from torch.fx import Graph, GraphModule
 from torch.fx.experimental.proxy_tensor import make_fx
@@ -116,10 +116,15 @@ def compile_function(
     """
     graph, tensors = record(function, inputs)
     on_cpu = all(tensor.device.type == "cpu" for tensor in tensors)
-    try:
-        program = _compile(graph, [*inputs, *tensors], on_cpu, trust_compiler=True)
-    except COMPILATION_ERRORS:
-        program = _compile(graph, [*inputs, *tensors], on_cpu, trust_compiler=False)
+    options = {
+        "cpp_wrapper": on_cpu,
+        "cpp.use_decompose_tanh": True,
+        "memory_planning": on_cpu,
+        "pattern_matcher": False,
+        "size_asserts": False,
+        "post_grad_custom_pre_pass": DoOnce(),
+    }  # which docs/performance.md explains
+    program = compile_graph(graph, [*inputs, *tensors], options)
 
     def run(*values: Tensor) -> None:
         program(*values, *tensors)
@@ -127,30 +132,13 @@ def compile_function(
     return run if on_cpu else CudaGraphModule(run)
 
 
-def _compile(
-    graph: GraphModule, arguments: Sequence[Tensor], on_cpu: bool, *, trust_compiler: bool
-) -> Callable[..., Any]:
-    """Let Inductor compile, with options that docs/performance.md explains.
-
-    A compiler that is trusted to know this processor's instructions need not prove it, which
-    takes a third of the time.
-    """
-    options: dict[str, Any] = {
-        "cpp_wrapper": on_cpu,
-        "cpp.use_decompose_tanh": True,
-        "cpp.vec_isa_ok": True if trust_compiler else None,
-        "memory_planning": on_cpu,
-        "pattern_matcher": False,
-        "size_asserts": False,
-        "post_grad_custom_pre_pass": DoOnce(),
-    }
-    return compile_graph(graph, arguments, options)
-
-
 def compile_graph(
     graph: GraphModule, arguments: Sequence[Tensor], options: dict[str, Any]
 ) -> Callable[..., Any]:
     """Let Inductor compile a graph of tensor operations, or find it compiled on the disk.
+
+    A compiler is trusted to know this processor's instructions. Only where it fails must it prove
+    which it knows, since that takes a third of the time.
 
     Args:
         graph: to compile.
@@ -160,6 +148,17 @@ def compile_graph(
     Raises:
         Exception: one of :data:`COMPILATION_ERRORS`.
     """
+    try:
+        return _compile(graph, arguments, {**options, "cpp.vec_isa_ok": True})
+    except COMPILATION_ERRORS as error:
+        if isinstance(error.inner_exception, InvalidCxxCompiler):  # it does not even start
+            raise
+        return _compile(graph, arguments, options)
+
+
+def _compile(
+    graph: GraphModule, arguments: Sequence[Tensor], options: dict[str, Any]
+) -> Callable[..., Any]:
     fake = FakeTensorMode(shape_env=ShapeEnv())  # which Inductor's cache on the disk needs
     examples: Any = [fake.from_tensor(each, static_shapes=True) for each in arguments]
     options = {**WITHOUT_EXTRAS, **options}
