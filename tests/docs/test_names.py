@@ -40,7 +40,7 @@ def test_every_dotted_name_leads_to_code(page: Path) -> None:
 @pytest.mark.parametrize("page", SOURCES, ids=lambda page: page.name)
 def test_every_file_is_there(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    for path in re.findall(rf"(?<![\w./:-])((?:{FOLDERS})/[\w./]*\w)", text):
+    for path in re.findall(rf"(?<![\w./:-])((?:{FOLDERS})/[\w./-]*\w)", text):
         assert (ROOT / path).exists(), path
     for path in re.findall(r"(?<![\w./])hyuav/[\w/]+\.py\b", text):
         assert (ROOT / "src" / path).exists(), path
