@@ -42,7 +42,7 @@ def test_the_best_candidates_lead_to_the_optimum(lessons: list[Lesson]) -> None:
     scene = torch.arange(scenes.count)
     helpers = Helpers(scene, scenes.start, scenes.num_slots.squeeze(-1))
     index = window(scenes.side, scenes.start, 1, REACH, TURNS[0].expand(scenes.count, 2, 2))
-    rewards = scenes.told(scenes.rewards, scene, index)
+    rewards = scenes.rewards_at(scene, index)
     worth = (rewards + several.values(helpers, index)).where(rewards >= 0, -torch.inf)
     torch.testing.assert_close(worth.amax(dim=-1), several.optimum, rtol=2e-3, atol=0.0)
 

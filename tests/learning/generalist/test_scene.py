@@ -59,7 +59,7 @@ def test_beyond_the_edge_a_map_tells_that_it_ends() -> None:
     scene = scenes_of(TINY, "hybrid")
     zero = torch.zeros(1, dtype=torch.int64)
     corner = window(scene.side, torch.tensor([[0, 0]]), 1, 21, TURNS[0].unsqueeze(0))
-    told = scene.told(scene.rewards, zero, corner)
+    told = scene.rewards_at(zero, corner)
     square = told.reshape(21, 21)
     assert (square[:10] == OUTSIDE).all()
     assert (square[:, :10] == OUTSIDE).all()

@@ -64,22 +64,19 @@ def choices(network: nn.Module, world: World, helpers: Helpers, turn: Tensor = T
         of all candidates, in the order of the world as it is.
     """
     scenes, scene, place = world.scenes, helpers.scene, helpers.place
-    size, side = len(scene), scenes.side
-    turns, straight = (own.to(place.device).expand(size, 2, 2) for own in (turn, TURNS[0]))
-    index = window(side, place, 1, REACH, straight)
-    rewards = scenes.told(scenes.rewards, scene, index)
-    views = [
-        scenes.told(scenes.views, scene * len(VIEWS) + number, window(side, place, *view, turns))
-        for number, view in enumerate(VIEWS)
-    ]
+    turns, straight = (own.to(place.device).reshape(-1, 2, 2) for own in (turn, TURNS[0]))
+    cell = window(scenes.side, place, 1, REACH, straight)
+    rewards = scenes.rewards_at(scene, cell)
+    views = [scenes.seen(view, scene, place, turns) for view in range(len(VIEWS))]
     position = scenes.corner[scene] + scenes.spacing[scene] * place
     tokens, owner = world.tokens.around(scene, position, turns)
-    values = network(torch.cat(views, dim=-1).float(), tokens, owner, helpers.slots_left - 1)
+    values = network(torch.cat(views, dim=-1), tokens, owner, helpers.slots_left - 1)
     # Where the network has the candidates: the way of the inverse turn.
-    middle = torch.full_like(place, REACH // 2)
-    values = values.gather(1, window(REACH, middle, 1, REACH, turns.mT))
+    middle = place.new_full((len(turns), 2), REACH // 2)
+    back = window(REACH, middle, 1, REACH, turns.mT)
+    values = values.gather(1, back.expand_as(values))
     allowed = scenes.reachable[scene] & (rewards > OUTSIDE)
-    return Choice((rewards + values).where(allowed, -torch.inf), rewards, index)
+    return Choice((rewards + values).where(allowed, -torch.inf), rewards, cell)
 
 
 def moved(helpers: Helpers, chosen: Tensor) -> Helpers:

@@ -25,6 +25,9 @@ class GeneralistNetwork(nn.Module):
         token_width: of the hidden layers that tokens pass.
     """
 
+    interpolation: Tensor
+    """(COARSE^2, REACH^2), see :func:`_interpolation`."""
+
     def __init__(self, width: int = 512, token_width: int = 64) -> None:
         super().__init__()
         self.each = nn.Sequential(
@@ -42,6 +45,7 @@ class GeneralistNetwork(nn.Module):
             nn.SiLU(),
             nn.Linear(width // 2, COARSE**2),
         )
+        self.register_buffer("interpolation", _interpolation(), persistent=False)
 
     def forward(self, views: Tensor, tokens: Tensor, owner: Tensor, slots_left: Tensor) -> Tensor:
         """Estimate what the slots after the next one bring, by the place in that one.
@@ -58,9 +62,15 @@ class GeneralistNetwork(nn.Module):
         each = self.each(tokens)
         nodes = each.new_zeros(views.shape[0], each.shape[-1]).index_add(0, owner, each) / 10.0
         left = slots_left.clamp(max=LONGEST)
-        clock = F.one_hot(left, LONGEST + 1).to(views.dtype)
-        count = left.to(views.dtype).unsqueeze(-1)
+        clock = F.one_hot(left, LONGEST + 1).to(nodes.dtype)
+        count = left.to(nodes.dtype).unsqueeze(-1)
         known = [views, nodes, clock, count / LONGEST, 1.0 / (1.0 + count)]
-        values = self.all(torch.cat(known, dim=-1)).reshape(-1, 1, COARSE, COARSE)
-        fine = F.interpolate(values, size=(REACH, REACH), mode="bilinear", align_corners=True)
-        return fine.flatten(1)
+        values: Tensor = self.all(torch.cat(known, dim=-1))
+        return values @ self.interpolation
+
+
+def _interpolation() -> Tensor:
+    """By what to multiply values of coarse places for those of all: (COARSE^2, REACH^2)."""
+    each = torch.eye(COARSE**2, device="cpu").reshape(-1, 1, COARSE, COARSE)
+    fine = F.interpolate(each, size=(REACH, REACH), mode="bilinear", align_corners=True)
+    return fine.flatten(1)

@@ -68,24 +68,35 @@ CANDIDATES = offsets(1, REACH)
 """Where a helper may be in the next slot, from where it is: (REACH^2, 2) spacings."""
 
 
-def window(side: int, place: Tensor, spacing: int, count: int, turns: Tensor) -> Tensor:
+def window(
+    side: int,
+    place: Tensor,
+    spacing: int,
+    count: int,
+    turns: Tensor,
+    begin: Tensor | None = None,
+) -> Tensor:
     """Where a square of places around each helper stands in its map: (B, count^2) int64.
 
     Args:
-        side: of the map; what lies beyond it stands at side^2.
+        side: of the map; what lies beyond it stands at its end, side^2 places from its beginning.
         place: (B, 2) int64, row and column of each helper.
         spacing: of the square's places, in those of the lattice.
         count: of its places along each side, odd.
         turns: (B, 2, 2) int64, one of :data:`TURNS` each: the square's axes lead along rows and
-            columns, or the other way, forward or back.
+            columns, or the other way, forward or back. Or (1, 2, 2), of all.
+        begin: where each one's map begins, (B,) int64; None for 0.
     """
     along = turns.abs().argmax(dim=1)
     sign = turns.sum(dim=1).unsqueeze(-1)
     axis = (torch.arange(count, device=place.device) - count // 2) * spacing
-    at = place.gather(1, along).unsqueeze(-1) + sign * axis
+    at = place.gather(1, along.expand_as(place)).unsqueeze(-1) + sign * axis
     stride = torch.where(along == 0, side, 1).unsqueeze(-1)
     first, second = (at * stride).where((at >= 0) & (at < side), side**2).unbind(dim=1)
-    return (first.unsqueeze(-1) + second.unsqueeze(-2)).clamp(max=side**2).flatten(1)
+    begin = place.new_zeros(1) if begin is None else begin
+    first = first + begin.unsqueeze(-1)
+    end = (begin + side**2).reshape(-1, 1, 1)
+    return (first.unsqueeze(-1) + second.unsqueeze(-2)).clamp_max_(end).flatten(1)
 
 
 class Others(NamedTuple):
@@ -145,10 +156,26 @@ class Scenes:
         """Places along one side of the maps."""
         return round((self.rewards.shape[-1] - 1) ** 0.5)
 
-    def told(self, maps: Tensor, row: Tensor, index: Tensor) -> Tensor:
-        """What maps (..., side^2 + 1) tell in rows (B,) of all of them, (B, K) at ``index``."""
-        flat = (row * maps.shape[-1]).unsqueeze(-1) + index
-        return maps.view(-1).index_select(0, flat.flatten()).view_as(index)
+    def seen(self, view: int, scene: Tensor, place: Tensor, turns: Tensor) -> Tensor:
+        """What helpers see in one of :data:`VIEWS`: (B, count^2).
+
+        Args:
+            view: its number.
+            scene: (B,) int64, of each helper.
+            place: (B, 2) int64, of each helper.
+            turns: as for :func:`window`.
+        """
+        begin = (scene * len(VIEWS) + view) * self.views.shape[-1]
+        return _read(self.views, window(self.side, place, *VIEWS[view], turns, begin))
+
+    def rewards_at(self, scene: Tensor, cell: Tensor) -> Tensor:
+        """What a slot brings in cells (B, K) of the maps of scenes (B,): (B, K)."""
+        return _read(self.rewards, cell + (scene * self.rewards.shape[-1]).unsqueeze(-1))
+
+
+def _read(maps: Tensor, index: Tensor) -> Tensor:
+    """All maps' numbers at places (B, K) of them in a row."""
+    return maps.view(-1).index_select(0, index.flatten()).view_as(index)
 
 
 def scenes_of(

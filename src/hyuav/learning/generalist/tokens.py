@@ -49,17 +49,23 @@ class Tokens(NamedTuple):
         Args:
             scene: (B,) int64, of each helper.
             position: (B, 2) m, of each helper.
-            turns: (B, 2, 2), the symmetry in which each sees the map.
+            turns: (B, 2, 2), the symmetry in which each sees the map, or (1, 2, 2), in which all
+                do.
 
         Returns:
             (M, TOKEN_SIZE), and to which helper each belongs, (M,) int64.
         """
         count = self.counts[scene]
-        owner = torch.arange(len(scene), device=scene.device).repeat_interleave(count)
-        ahead = torch.arange(len(owner), device=scene.device) - (count.cumsum(dim=0) - count)[owner]
-        index = self.first[scene][owner] + ahead
-        relative = (self.places[index] - position[owner]).unsqueeze(-2) / LENGTH
-        seen = (relative @ turns[owner].to(relative.dtype)).squeeze(-2)
+        owner = torch.repeat_interleave(count)
+        # A helper's tokens follow one another, from the first of its scene on.
+        begin = self.first[scene] - (count.cumsum(dim=0) - count)
+        index = begin[owner] + torch.arange(len(owner), device=scene.device)
+        relative = (self.places[index] - position[owner]) / LENGTH
+        turns = turns.to(relative.dtype)
+        if len(turns) == 1:
+            seen = relative @ turns[0]
+        else:
+            seen = (relative.unsqueeze(-2) @ turns[owner]).squeeze(-2)
         return torch.cat([seen, self.known[index]], dim=-1), owner
 
 
