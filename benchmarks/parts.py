@@ -61,17 +61,27 @@ def scaling(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator[Row
 def job(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator[Row]:
     """Whole trainings, each in a process of its own, start to finish.
 
-    This project's are two: the first of its kind on a machine, and one that finds its programs
-    compiled.
+    This project's are the first of their kind on a machine, and one of a learner that finds its
+    program compiled.
     """
-    work = _work(plan, scenario, episodes=plan.episodes)
-    peers = [peer for peer in plan.peers if peer == REFERENCE]
+
+    def trained(name: str, learners: int = 1) -> Entry:
+        threads = min(learners, cores())
+        work = _work(plan, scenario, learners=learners, episodes=plan.episodes, threads=threads)
+        return Entry(name, work)
+
+    entries = [
+        *(trained("hyuav", learners) for learners in plan.learners),
+        *(trained(peer) for peer in plan.peers if peer == REFERENCE),
+        trained("hyuav_again"),
+    ]
     with tempfile.TemporaryDirectory() as cache:
         for number in range(1, plan.rounds + 1):
-            for name in ("hyuav", *peers, "hyuav_again"):
-                report(f"job: {name}, {plan.episodes} episodes, round {number}")
+            for entry in entries:
+                name, work = entry.name, entry.work
+                report(f"job: {name}, {work.learners} x {plan.episodes} episodes, round {number}")
                 kept = cache if name == "hyuav_again" or number == 1 else None
-                yield job_seconds("job", Entry(name, work), number, kept)
+                yield job_seconds("job", entry, number, kept)
 
 
 def references(plan: Benchmark, scenario: Scenario, report: Report) -> Iterator[Row]:

@@ -115,7 +115,7 @@ def _environment(rows: pd.DataFrame, numpy: float) -> Table:
 def _job(rows: pd.DataFrame) -> Table:
     episodes = rows["median"] * rows["seconds"] / rows["num_slots"] / rows["learners"]
     title = f"Whole job: {episodes.iloc[0]:.0f} episodes, start to finish"
-    table = results_table(title, "Entry", "seconds", "times as fast as SB3", "MiB")
+    table = results_table(title, "Entry", "seconds", "per learner, to SB3", "MiB")
     for _, row in rows.iterrows():
         table.add_row(
             label(row),

@@ -102,6 +102,7 @@ def invented_rows() -> list[dict[str, object]]:
 
     return [
         row("job", "hyuav", 400.0),
+        row("job", "hyuav", 1300.0, learners=10),
         row("job", "stable_baselines3", 100.0),
         *(row("learners", "hyuav", 1000.0 * n, learners=n) for n in (1, 2, 64)),
         *(row("ues", "hyuav", 900.0, num_ues=n) for n in (10, 1000)),
@@ -118,6 +119,7 @@ def test_every_part_is_printed_within_80_columns_and_drawn(tmp_path: Path) -> No
     print_tables(results, console)
     printed = console.export_text()
     assert "4.00" in printed  # 400 beside 100 steps/s
+    assert "13.00" in printed
     assert max(map(len, printed.splitlines())) <= 80
     assert "…" not in printed
     draw(results, tmp_path)
