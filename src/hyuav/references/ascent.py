@@ -85,7 +85,7 @@ class Ascent:
             with torch.no_grad():
                 velocity.clamp_(-1.0, 1.0)
                 decibels.clamp_(lowest, 0.0)
-        return list(zip(best_paths, best_powers, strict=True))
+        return list(map(Plan, best_paths, best_powers))
 
     def _flown(self, starts: Tensor, velocity: Tensor) -> Tensor:
         """The paths (B, T + 1, H, 2) m of velocities (B, T, H, 2) in units of v_max."""

@@ -9,6 +9,7 @@ comes out can be flown, so its return is a lower bound of the optimum.
 
 from collections.abc import Iterator, Sequence
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -41,8 +42,14 @@ WINDOW = 10.0
 TURNS = 60
 """Improvements at most, each of one helper's flight."""
 
-Plan = tuple[Tensor, Tensor]
-"""A path (T + 1, H, 2) m and powers (T, H), in units of the nominal power."""
+
+class Plan(NamedTuple):
+    """A flight of all helpers before it is flown."""
+
+    path: Tensor
+    """(T + 1, H, 2) m."""
+    share: Tensor
+    """(T, H), powers in units of the nominal one."""
 
 
 class SeveralHelpers:
@@ -102,7 +109,7 @@ class SeveralHelpers:
         for jammers in range(scenario.num_helpers + 1):
             ends = [*jamming[:jammers], *[relay] * (scenario.num_helpers - jammers)]
             path = _straight(self._physics, ends, num_slots)
-            yield path, path.new_ones(num_slots, scenario.num_helpers)
+            yield Plan(path, path.new_ones(num_slots, scenario.num_helpers))
 
     def _joint_plan(self, mode_rule: str, num_slots: int) -> Plan:
         """The best flight of two helpers on a coarse grid."""
@@ -129,7 +136,7 @@ class SeveralHelpers:
             chosen.append(power[(*points[0], *points[1])])
         steps = np.array(flight)
         places = [grid.places(steps[:, helper]) for helper, grid in enumerate(grids)]
-        return torch.stack(places, dim=1), torch.stack(chosen)
+        return Plan(torch.stack(places, dim=1), torch.stack(chosen))
 
     def _joint_rewards(self, mode_rule: str, grids: Sequence[Grid]) -> tuple[Values, Tensor]:
         """Of all pairs of places with their best powers: (X, Y, X', Y'), and (..., 2)."""
@@ -197,7 +204,7 @@ class SeveralHelpers:
         path[:, helper] = grid.places(flight).to(path)
         row, column = flight[1:].T
         power[:, helper] = levels[torch.arange(len(levels)), row, column]
-        return path, power
+        return Plan(path, power)
 
 
 def _straight(physics: Physics, destinations: Sequence[Point], num_slots: int) -> Tensor:

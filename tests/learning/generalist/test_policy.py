@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from hyuav import Scenario, family, make_env, pretrained
-from hyuav.learning.generalist.plans import Plan
+from hyuav.learning.generalist.plans import roughly_best
 from hyuav.learning.generalist.policy import GeneralistPolicy
 from hyuav.learning.generalist.refine import refined
 from hyuav.physics.slot import Physics
@@ -87,7 +87,7 @@ def test_several_helpers_earn_no_less_than_their_rough_flight(name: str, seed: i
         estimate_return(physics, path.double(), mode_rule, 1, torch.Generator(), share.double())[0]
         for path, share in (
             policy_of(scenario, mode_rule).plan(),
-            Plan.roughly_best(scenario, mode_rule),
+            roughly_best(scenario, mode_rule),
         )
     )
     assert led >= rough * (1 - 1e-5) > 10.0

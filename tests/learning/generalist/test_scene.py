@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from hyuav import Scenario, family
-from hyuav.learning.generalist.plans import Plan
+from hyuav.learning.generalist.plans import at_the_end, roughly_best
 from hyuav.learning.generalist.scene import (
     CANDIDATES,
     OUTSIDE,
@@ -86,7 +86,7 @@ def test_the_turns_are_the_symmetries_of_the_square() -> None:
 def test_several_helpers_see_what_the_others_make_possible() -> None:
     scenario = Scenario.preset("contested")
     alone = scenes_of(scenario, "hybrid", draws=1)
-    together = scenes_of(scenario, "hybrid", 1, Plan.roughly_best(scenario, "hybrid").at_the_end)
+    together = scenes_of(scenario, "hybrid", 1, at_the_end(roughly_best(scenario, "hybrid")))
     assert together.count == alone.count == 2
     assert bool((together.best > alone.best).all())
     assert float(together.best.min()) > 15.0

@@ -4,14 +4,13 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import torch
-from torch import Tensor
 
 from hyuav.learning.generalist.scene import Others
 from hyuav.physics.modes import allowed_vectors
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.ascent import Ascent
-from hyuav.references.joint import SeveralHelpers
+from hyuav.references.joint import Plan, SeveralHelpers
 from hyuav.references.rewards import ExpectedReward
 
 
@@ -56,46 +55,35 @@ def shared_draws(scenario: Scenario, mode_rule: str, draws: int) -> int:
     return max(draws * FEW_MODES // max(vectors, FEW_MODES), 1)
 
 
-class Plan(NamedTuple):
-    """A flight of all helpers before it is flown."""
+def roughly_best(scenario: Scenario, mode_rule: str) -> Plan:
+    """The best rough flight that is found."""
+    physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
+    spacing, draws = coarseness(scenario)
+    draws = shared_draws(scenario, mode_rule, draws)
+    anywhere = SeveralHelpers(physics, spacing, POWER_STEP, draws, seed=0, window=scenario.map_side)
+    straight = list(anywhere.straight(scenario.num_slots))
+    if scenario.num_helpers == 1:  # whose program does not depend on where it begins
+        return anywhere.improved(mode_rule, straight[0], turns=1)
+    turns = TURNS_OF_EACH * scenario.num_helpers
+    if scenario.num_helpers == 2:
+        rough = [anywhere.best(mode_rule, scenario.num_slots, turns)]
+    else:
+        rough = [anywhere.improved(mode_rule, plan, turns) for plan in straight]
+    plans = climbed(scenario, mode_rule, [*rough, *straight])
+    judging = ExpectedReward(physics, OF_SEVERAL.draws, torch.Generator().manual_seed(2))
+    return max(plans, key=lambda plan: judging.of_flight(mode_rule, *plan))
 
-    path: Tensor
-    """(T + 1, H, 2) m."""
-    share: Tensor
-    """(T, H), powers in units of the nominal one."""
 
-    @classmethod
-    def roughly_best(cls, scenario: Scenario, mode_rule: str) -> "Plan":
-        """The best rough flight that is found."""
-        physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
-        spacing, draws = coarseness(scenario)
-        draws = shared_draws(scenario, mode_rule, draws)
-        anywhere = SeveralHelpers(
-            physics, spacing, POWER_STEP, draws, seed=0, window=scenario.map_side
-        )
-        straight = list(anywhere.straight(scenario.num_slots))
-        if scenario.num_helpers == 1:  # whose program does not depend on where it begins
-            return cls(*anywhere.improved(mode_rule, straight[0], turns=1))
-        turns = TURNS_OF_EACH * scenario.num_helpers
-        if scenario.num_helpers == 2:
-            rough = [anywhere.best(mode_rule, scenario.num_slots, turns)]
-        else:
-            rough = [anywhere.improved(mode_rule, plan, turns) for plan in straight]
-        plans = climbed(scenario, mode_rule, [cls(*plan) for plan in (*rough, *straight)])
-        judging = ExpectedReward(physics, OF_SEVERAL.draws, torch.Generator().manual_seed(2))
-        return max(plans, key=lambda plan: judging.of_flight(mode_rule, *plan))
-
-    @property
-    def at_the_end(self) -> Others:
-        """Where the helpers are after the last slot, and their powers in it."""
-        return Others(self.path[-1], self.share[-1])
+def at_the_end(plan: Plan) -> Others:
+    """Where the helpers are after the last slot, and their powers in it."""
+    return Others(plan.path[-1], plan.share[-1])
 
 
 def climbed(scenario: Scenario, mode_rule: str, plans: Iterable[Plan]) -> list[Plan]:
     """Flights made better by the gradient of what they bring."""
     physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
     ascent = Ascent(physics, mode_rule, OF_SEVERAL.draws, seed=1)
-    return [Plan(*plan) for plan in ascent.improved([*plans])]
+    return ascent.improved([*plans])
 
 
 def settled(scenario: Scenario, mode_rule: str, plan: Plan) -> list[Plan]:
@@ -103,5 +91,5 @@ def settled(scenario: Scenario, mode_rule: str, plan: Plan) -> list[Plan]:
     physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
     draws = shared_draws(scenario, mode_rule, FEW_DRAWS)
     nearby = SeveralHelpers(physics, NEAR, FINE_STEP, draws, seed=0, window=WINDOW)
-    found = Plan(*nearby.improved(mode_rule, plan, TURNS_OF_EACH * scenario.num_helpers))
+    found = nearby.improved(mode_rule, plan, TURNS_OF_EACH * scenario.num_helpers)
     return [plan, found, *climbed(scenario, mode_rule, [found])]

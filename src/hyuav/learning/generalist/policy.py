@@ -10,9 +10,10 @@ from torch import Tensor
 from hyuav.learning.generalist.decide import Choice, Helpers, World, choices
 from hyuav.learning.generalist.network import GeneralistNetwork
 from hyuav.learning.generalist.plans import (
-    Plan,
+    at_the_end,
     climbed,
     coarseness,
+    roughly_best,
     settled,
     shared_draws,
 )
@@ -28,6 +29,7 @@ from hyuav.learning.generalist.tokens import Tokens
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
 from hyuav.references.flight import towards
+from hyuav.references.joint import Plan
 from hyuav.references.power import best_levels
 from hyuav.references.rewards import ExpectedReward
 
@@ -75,14 +77,14 @@ class GeneralistPolicy(TensorDictModuleBase):
         super().__init__()
         self.network, self.scenario, self.mode_rule = network, scenario, mode_rule
         self._several = scenario.num_helpers > 1
-        self._rough = Plan.roughly_best(scenario, mode_rule)
+        self._rough = roughly_best(scenario, mode_rule)
         few, several = (
             shared_draws(scenario, mode_rule, count) for count in (ROUGH_DRAWS, DRAWS_OF_SEVERAL)
         )
         draws = DRAWS if scenario.power_control else 4 * DRAWS
         if self._several:
             draws = few
-        scenes = scenes_of(scenario, mode_rule, draws, self._rough.at_the_end)
+        scenes = scenes_of(scenario, mode_rule, draws, at_the_end(self._rough))
         self.world = World(scenes, Tokens.of([scenario] * scenes.count))
         physics = Physics(scenario, dtype=torch.float32)
         self._few_draws, self._expected, self._judging = (

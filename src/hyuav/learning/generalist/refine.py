@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import torch
 
-from hyuav.learning.generalist.plans import Plan
 from hyuav.learning.generalist.policy import GeneralistPolicy
 from hyuav.physics.slot import Physics
 from hyuav.references.flight import FlightPolicy, flyable
@@ -45,7 +44,7 @@ def refined(policy: GeneralistPolicy) -> FlightPolicy:
             physics, search.resolution, search.power_step, search.draws, 0, search.window
         )
         turns = search.rounds * scenario.num_helpers
-        plans.append(Plan(*improving.improved(policy.mode_rule, plans[-1], turns)))
+        plans.append(improving.improved(policy.mode_rule, plans[-1], turns))
     # By few draws a search may prefer what is worse.
     path, share = max(plans, key=policy.expected)
     return FlightPolicy(flyable(path, physics, policy.mode_rule), scenario, share)
