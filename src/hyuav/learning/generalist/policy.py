@@ -45,7 +45,7 @@ ON_FLIGHT = 1e-2
 
 
 class Seen(NamedTuple):
-    """How helpers look at the world, each way a row."""
+    """How helpers look at the world, each way a row; one row may be for all."""
 
     turn: Tensor
     """(B, 2, 2), the symmetry in which the network sees it."""
@@ -149,8 +149,7 @@ class GeneralistPolicy(TensorDictModuleBase):
         target, power = path[slot + 1], powers[slot]
         off = ((position - path[slot]).abs() > ON_FLIGHT).flatten(1).any(dim=1)
         if bool(off.any()):
-            seen = Seen(*(each.expand(int(off.sum()), *each.shape[1:]) for each in self._seen))
-            target[off], power[off] = self._decided(position[off], slot[off], seen)
+            target[off], power[off] = self._decided(position[off], slot[off], self._seen)
         return towards(self.scenario, position, target, power)
 
     def _decided(self, position: Tensor, slot: Tensor, seen: Seen) -> tuple[Tensor, Tensor]:
