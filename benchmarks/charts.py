@@ -91,11 +91,12 @@ def _mark_floor(axes: Axes, rows: pd.DataFrame) -> None:
     axes.set_xlim(0.0, max(axes.get_xlim()[1], 1.05 * floor))
     axes.annotate(
         "arithmetic floor",
-        (floor, 0.0),
-        xytext=(-3, 0),
+        (floor, 1.0),
+        xycoords=axes.get_xaxis_transform(),
+        xytext=(0, 2),
         textcoords="offset points",
         ha="right",
-        va="center",
+        va="bottom",
         fontsize=7,
         color="0.3",
     )

@@ -14,7 +14,7 @@ from hyuav._support.terminal import print_line, results_table
 LABELS = {
     "hyuav": "HyUAV",
     "hyuav_again": "HyUAV, run again",
-    "hyuav_robust": "HyUAV, robust variant",
+    "hyuav_robust": "HyUAV robust",
     "stable_baselines3": "Stable-Baselines3",
     "sbx": "SBX",
     "cleanrl": "CleanRL-style",
@@ -69,7 +69,7 @@ def _training(rows: pd.DataFrame, results: Results) -> Table:
         for device, rate in results.matrix_rates.items()
     )
     title = f"Training: steps of all learners per second, median and range{floors}"
-    table = results_table(title, "Entry", "Steps/s", "to SB3", "to SBX", "of floor", "threads")
+    table = results_table(title, "Entry", "Steps/s", "to SB3", "to SBX", "floor", "threads")
     for _, row in rows.iterrows():
         table.add_row(
             label(row),
@@ -84,7 +84,7 @@ def _training(rows: pd.DataFrame, results: Results) -> Table:
 
 def _costs(rows: pd.DataFrame) -> Table:
     title = "Before the first measured step, and the most memory held"
-    table = results_table(title, "Entry", "import (s)", "build (s)", "compile, warm up (s)", "MiB")
+    table = results_table(title, "Entry", "import (s)", "build (s)", "compile, warm (s)", "MiB")
     for _, row in rows.iterrows():
         seconds = (row[f"{name}_seconds"] for name in ("start_up", "build", "warm_up"))
         memory = f"{row['peak_mebibytes']:.0f}"

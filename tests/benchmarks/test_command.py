@@ -101,6 +101,10 @@ def invented_rows() -> list[dict[str, object]]:
         }
 
     return [
+        row("training", "hyuav", 800.0),
+        row("training", "hyuav", 2345.0, learners=10),
+        row("training", "hyuav_robust", 1234.0, learners=10),
+        *(row("training", peer, 200.0) for peer in ("stable_baselines3", "sbx")),
         row("job", "hyuav", 400.0),
         row("job", "hyuav", 1300.0, learners=10),
         row("job", "stable_baselines3", 100.0),
@@ -123,14 +127,15 @@ def test_every_part_is_printed_within_80_columns_and_drawn(tmp_path: Path) -> No
     assert max(map(len, printed.splitlines())) <= 80
     assert "…" not in printed
     draw(results, tmp_path)
-    assert pictures(tmp_path) == {"scaling.png", "scaling.pdf"}
+    figures = {f"{name}.{kind}" for name in ("training", "scaling") for kind in ("png", "pdf")}
+    assert pictures(tmp_path) == figures
 
 
 def test_of_several_numbers_of_threads_the_fastest_counts() -> None:
-    one, two = invented_rows()[0], {**invented_rows()[0], "threads": 2, "steps_per_second": 500.0}
+    one, two = invented_rows()[0], {**invented_rows()[0], "threads": 2, "steps_per_second": 900.0}
     summary = Results({}, {"cpu": 2e11}, [one, two]).summary()
     assert summary["threads"].tolist() == [2]
-    assert summary["median"].tolist() == [500.0]
+    assert summary["median"].tolist() == [900.0]
 
 
 def test_an_entry_that_fails_says_why() -> None:
