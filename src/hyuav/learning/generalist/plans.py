@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import torch
 
-from hyuav.learning.generalist.scene import Others
+from hyuav.learning.generalist.scene import DRAWS, Others
 from hyuav.physics.modes import allowed_vectors
 from hyuav.physics.scenario import Scenario
 from hyuav.physics.slot import Physics
@@ -23,11 +23,17 @@ class Coarseness(NamedTuple):
     """Of a slot's fading, over which what it brings is averaged; 1 leaves it out."""
 
 
-OF_ONE, OF_SEVERAL = Coarseness(4.0, 32), Coarseness(20.0, 8)
-"""For one helper, and for several."""
+OF_ONE, OF_SEVERAL = Coarseness(4.0, 32), Coarseness(20.0, 32)
+"""For one helper, and for several, whose draws are shared among the modes that a rule allows."""
+
+CLIMBING_DRAWS = 8
+"""Of a slot's fading, by whose mean the flights of several helpers climb."""
 
 TURNS_OF_EACH = 2
 """How often each of several helpers' flights is improved at most, with the others' held."""
+
+QUIETLY = 1e-3
+"""The power, in units of the nominal one, at which straight flights are begun too."""
 
 POWER_STEP = 15.0
 """Between the levels of power that are tried, in dB."""
@@ -41,9 +47,12 @@ FEW_MODES = 4
 """That may be chosen in a slot, those of two helpers, for which all draws are taken."""
 
 
-def coarseness(scenario: Scenario) -> Coarseness:
+def coarseness(scenario: Scenario, mode_rule: str) -> Coarseness:
     """How roughly the flights of a scenario are found."""
-    return OF_ONE if scenario.num_helpers == 1 else OF_SEVERAL
+    if scenario.num_helpers == 1:
+        return OF_ONE
+    vectors = len(allowed_vectors(mode_rule, scenario.num_helpers))
+    return OF_SEVERAL._replace(draws=max(OF_SEVERAL.draws // vectors, 1))
 
 
 def shared_draws(scenario: Scenario, mode_rule: str, draws: int) -> int:
@@ -58,8 +67,7 @@ def shared_draws(scenario: Scenario, mode_rule: str, draws: int) -> int:
 def roughly_best(scenario: Scenario, mode_rule: str) -> Plan:
     """The best rough flight that is found."""
     physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
-    spacing, draws = coarseness(scenario)
-    draws = shared_draws(scenario, mode_rule, draws)
+    spacing, draws = coarseness(scenario, mode_rule)
     anywhere = SeveralHelpers(physics, spacing, POWER_STEP, draws, seed=0, window=scenario.map_side)
     straight = list(anywhere.straight(scenario.num_slots))
     if scenario.num_helpers == 1:  # whose program does not depend on where it begins
@@ -69,8 +77,10 @@ def roughly_best(scenario: Scenario, mode_rule: str) -> Plan:
         rough = [anywhere.best(mode_rule, scenario.num_slots, turns)]
     else:
         rough = [anywhere.improved(mode_rule, plan, turns) for plan in straight]
+    if scenario.power_control:  # who is overheard at full power finds no way down from there
+        straight += [Plan(path, QUIETLY * share) for path, share in straight]
     plans = climbed(scenario, mode_rule, [*rough, *straight])
-    judging = ExpectedReward(physics, OF_SEVERAL.draws, torch.Generator().manual_seed(2))
+    judging = ExpectedReward(physics, 4 * DRAWS, torch.Generator().manual_seed(2))
     return max(plans, key=lambda plan: judging.of_flight(mode_rule, *plan))
 
 
@@ -82,7 +92,7 @@ def at_the_end(plan: Plan) -> Others:
 def climbed(scenario: Scenario, mode_rule: str, plans: Iterable[Plan]) -> list[Plan]:
     """Flights made better by the gradient of what they bring."""
     physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
-    ascent = Ascent(physics, mode_rule, OF_SEVERAL.draws, seed=1)
+    ascent = Ascent(physics, mode_rule, CLIMBING_DRAWS, seed=1)
     return ascent.improved([*plans])
 
 
