@@ -11,7 +11,7 @@ from hyuav.learning.generalist.policy import GeneralistPolicy
 from hyuav.learning.generalist.refine import refined
 from hyuav.physics.slot import Physics
 from hyuav.references.optimum import solve_optimum
-from hyuav.references.rewards import estimate_return
+from hyuav.references.rewards import ExpectedReward, estimate_return
 
 
 def short(name: str, seed: int) -> Scenario:
@@ -108,3 +108,14 @@ def test_no_flight_goes_to_the_lesser_of_two_places(seed: int) -> None:
     )
     assert flown >= 0.97 * highest
     assert improved >= 0.99 * highest
+
+
+def test_relays_that_earn_quietly_and_by_luck_are_found() -> None:
+    scenario, mode_rule = family("two", 276, "test")
+    scenario = dataclasses.replace(scenario, num_slots=6)
+    expected = ExpectedReward(Physics(scenario), 512, torch.Generator().manual_seed(0))
+    start, _ = scenario.helper_starts
+    hovering = torch.tensor([start, (-11.2, 25.4)]).expand(7, 2, 2)
+    power = torch.tensor([1.0, 10**-3.5]).expand(6, 2)
+    earned = expected.of_flight(mode_rule, *roughly_best(scenario, mode_rule))
+    assert earned >= 0.7 * expected.of_flight(mode_rule, hovering, power) > 0.4
