@@ -72,7 +72,7 @@ def move(position: Tensor, velocity: Tensor, slot_duration: float, map_side: flo
         slot_duration: Delta in s.
         map_side: l_max in m.
     """
-    target = position.add(velocity, alpha=slot_duration)
+    target = position + velocity * slot_duration
     off_map = ~(target.abs() <= map_side / 2).all(dim=-1)  # so that NaN does not move the helper
     position = torch.where(off_map.unsqueeze(-1), position, target)
     return Move(position, velocity, off_map)
