@@ -6,7 +6,7 @@ from torch import Tensor
 from hyuav.physics.energy import computation_energy
 
 
-def covered(distance: Tensor, coverage_radius: float) -> Tensor:
+def covered(distance: Tensor, coverage_radius: float | Tensor) -> Tensor:
     """Eq. 5: whether a UE lies within D_max of a UAV.
 
     It may send straight to the legitimate UAV if that covers it, and through a helper if both do.
@@ -21,7 +21,9 @@ def covered(distance: Tensor, coverage_radius: float) -> Tensor:
     return distance <= coverage_radius
 
 
-def offloading_decision(secrecy_rate: Tensor, allowed: Tensor, min_secrecy_rate: float) -> Tensor:
+def offloading_decision(
+    secrecy_rate: Tensor, allowed: Tensor, min_secrecy_rate: float | Tensor
+) -> Tensor:
     """Eq. 11: offload where allowed and where the secrecy rate exceeds epsilon.
 
     Args:

@@ -80,7 +80,10 @@ class Physics:
         self.k_factor = self._k_factor()
         """Of all links, (link_row.size,), as power ratios."""
         self._no_links = self._tensor([])
+        # Tensors, since PyTorch reckons with them faster than with numbers of Python.
         self._sent = self._nominal()
+        self._coverage_radius = self._tensor(scenario.coverage_radius)
+        self._min_secrecy_rate = self._tensor(scenario.min_secrecy_rate)
         self.mode_vectors = [
             torch.tensor(vector, device=self.device)
             for vector in modes.mode_vectors(scenario.num_helpers)
@@ -259,7 +262,7 @@ class Physics:
             better = other_allowed & ((other_rate > rate) | ~allowed)
             way = torch.where(better, number, way)
             rate, allowed = torch.where(better, other_rate, rate), allowed | other_allowed
-        decision = offloading.offloading_decision(rate, allowed, scenario.min_secrecy_rate)
+        decision = offloading.offloading_decision(rate, allowed, self._min_secrecy_rate)
         if self.edge_can_saturate:
             if tasks is None:
                 raise ValueError("tasks: expected, because they can fill the edge server")
@@ -287,7 +290,7 @@ class Physics:
             if relaying:
                 through = rates.relay_rates(gains, sent, helper, jammers, kind)
                 distance = geometry.ue_to_helper.select(-1, helper)
-                near = offloading.covered(distance, self.scenario.coverage_radius)
+                near = offloading.covered(distance, self._coverage_radius)
                 allowed = near & geometry.standing.may_be_relayed
                 ways.append((helper + 1, rates.secrecy_rate(through), allowed))
         return ways
