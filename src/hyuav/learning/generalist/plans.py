@@ -38,7 +38,6 @@ QUIETLY = 1e-3
 POWER_STEP = 15.0
 """Between the levels of power that are tried, in dB."""
 
-
 NEAR, WINDOW, FINE_STEP, FEW_DRAWS = 4.0, 8.0, 5.0, 4
 """Of the last search nearby: the grid's spacing in m, how far in m a slot's place moves at most,
 the step in dB between levels of power, and the draws of a slot's fading."""
@@ -47,27 +46,32 @@ FEW_MODES = 4
 """That may be chosen in a slot, those of two helpers, for which all draws are taken."""
 
 
-def coarseness(scenario: Scenario, mode_rule: str) -> Coarseness:
+def coarseness(scenario: Scenario) -> Coarseness:
     """How roughly the flights of a scenario are found."""
-    if scenario.num_helpers == 1:
-        return OF_ONE
-    vectors = len(allowed_vectors(mode_rule, scenario.num_helpers))
-    return OF_SEVERAL._replace(draws=max(OF_SEVERAL.draws // vectors, 1))
+    return OF_ONE if scenario.num_helpers == 1 else OF_SEVERAL
 
 
-def shared_draws(scenario: Scenario, mode_rule: str, draws: int) -> int:
+def shared_draws(scenario: Scenario, mode_rule: str, draws: int, modes: int = FEW_MODES) -> int:
     """How many draws of the fading are left to each of the modes that a rule allows, 1 at least.
 
     The best one of many modes rests less on fading, and takes as long as all of them.
+
+    Args:
+        scenario: that is flown.
+        mode_rule: who chooses the modes.
+        draws: that each mode has where there are few.
+        modes: how many count as few; more share what these would have together.
     """
     vectors = len(allowed_vectors(mode_rule, scenario.num_helpers))
-    return max(draws * FEW_MODES // max(vectors, FEW_MODES), 1)
+    return max(draws * modes // max(vectors, modes), 1)
 
 
 def roughly_best(scenario: Scenario, mode_rule: str) -> Plan:
     """The best rough flight that is found."""
     physics = Physics(scenario, dtype=torch.float32, layout_is_known=False)
-    spacing, draws = coarseness(scenario, mode_rule)
+    spacing, draws = coarseness(scenario)
+    if scenario.num_helpers > 1:
+        draws = shared_draws(scenario, mode_rule, draws, modes=1)
     anywhere = SeveralHelpers(physics, spacing, POWER_STEP, draws, seed=0, window=scenario.map_side)
     straight = list(anywhere.straight(scenario.num_slots))
     if scenario.num_helpers == 1:  # whose program does not depend on where it begins

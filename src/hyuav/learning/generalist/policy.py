@@ -97,7 +97,7 @@ class GeneralistPolicy(TensorDictModuleBase):
     def _best_flight(self) -> tuple[Seen, Plan]:
         """The flight that brings most of those to which its decisions lead, and how it looks."""
         turns = torch.stack(TURNS[:1] if self._several else TURNS)
-        windows = torch.tensor([coarseness(self.scenario, self.mode_rule).spacing, torch.inf])
+        windows = torch.tensor([coarseness(self.scenario).spacing, torch.inf])
         ways = Seen(turns.repeat_interleave(len(windows), dim=0), windows.repeat(len(turns)))
         path, share = self._flown(ways)
         plans = [Plan(path[:, way], share[:, way]) for way in range(len(ways.turn))]
